@@ -1,0 +1,37 @@
+//! Saliency-guided stereo perception: which things in view matter, and how far
+//! they are.
+//!
+//! Data flows one way through the rooms:
+//!
+//! ```text
+//! door in -> sync -> pipeline stages -> door out
+//! ```
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`config`], [`error`], [`stamp`], [`image`], [`camera`], [`perception`], [`simd`] | the nouns |
+//! | `input` | doors in: live topics, bags, dataset folders, the renderer |
+//! | `sync` | pairs left, right and camera infos by stamp |
+//! | [`pipeline`], [`stage`] | the method: one frame in, one perception out |
+//! | `output` | doors out: live topics, bags, the HTML report |
+//! | `ros` | messages, conversions, parameters, the node |
+//! | `drive`, `command` | sources paired with sinks, and the command line |
+//!
+//! Without the default feature `tool` only the core remains, which knows no
+//! ROS, file, socket or clock.
+
+pub mod camera;
+pub mod config;
+pub mod error;
+pub mod image;
+#[cfg(feature = "tool")]
+pub mod input;
+#[cfg(feature = "tool")]
+pub mod output;
+pub mod perception;
+pub mod pipeline;
+#[cfg(feature = "tool")]
+pub mod ros;
+pub mod simd;
+pub mod stage;
+pub mod stamp;

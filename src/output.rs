@@ -1,0 +1,27 @@
+//! Doors out: where perceptions go.
+
+use crate::input::Observation;
+use crate::perception::Perception;
+
+/// A consumer of perceptions.
+pub trait Sink {
+    /// What can go wrong on the way out.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// Takes one frame and what was made of it.
+    ///
+    /// # Errors
+    /// When it could not be written.
+    fn write(
+        &mut self,
+        observation: &Observation,
+        perception: &Perception,
+    ) -> Result<(), Self::Error>;
+
+    /// Completes the output: afterwards it is whole and readable. Called once,
+    /// also after an interruption.
+    ///
+    /// # Errors
+    /// When it could not be completed.
+    fn finish(&mut self) -> Result<(), Self::Error>;
+}

@@ -1,0 +1,168 @@
+//! The method, frame by frame.
+
+use crate::config::Config;
+use crate::image::{Image, Size};
+use crate::perception::{Clock, Perception, Stage, StageTimes, StereoFrame, View};
+use crate::simd::Level;
+use crate::stage::coarse::{Coarse, CoarseDisparity};
+use crate::stage::depth::Depth;
+use crate::stage::preprocess::Preprocess;
+use crate::stage::refine::Refine;
+use crate::stage::regions::{RegionSource, Regions};
+use crate::stage::roi::Roi;
+use crate::stage::saliency::{Previous, Saliency, Scene};
+use crate::stage::stereo::{Matches, Stereo};
+use crate::stage::track::Track;
+
+/// The stages and their buffers for pictures of one size.
+///
+/// Two registers look back in time: `previous` and `track`. Everything else
+/// depends on the current frame alone.
+pub struct Pipeline {
+    preprocess: Preprocess,
+    coarse: Coarse,
+    saliency: Saliency,
+    roi: Roi,
+    stereo: Stereo,
+    refine: Refine,
+    depth: Depth,
+    regions: Regions,
+    track: Track,
+
+    previous: Previous,
+
+    right: View,
+    coarse_disparity: CoarseDisparity,
+    attention: Image<f32>,
+    matches: Matches,
+    clock: Clock,
+}
+
+impl Pipeline {
+    /// The pipeline for pictures of `size` under a valid `config`.
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
+        let preprocess = Preprocess::new(config, size);
+        let size = preprocess.output_size();
+        Self {
+            preprocess,
+            coarse: Coarse::new(config, size, level),
+            saliency: Saliency::new(config, size, level),
+            roi: Roi::new(config, size),
+            stereo: Stereo::new(config, size, level),
+            refine: Refine::new(config, size),
+            depth: Depth::new(config),
+            regions: Regions::new(config, size),
+            track: Track::new(config),
+            previous: Previous::default(),
+            right: View::default(),
+            coarse_disparity: CoarseDisparity::default(),
+            attention: Image::default(),
+            matches: Matches::default(),
+            clock: Clock::none(),
+        }
+    }
+
+    /// Measures stage times with `clock`.
+    #[must_use]
+    pub fn with_clock(mut self, clock: Clock) -> Self {
+        self.clock = clock;
+        self
+    }
+
+    /// Matches a centred rectangle of `fraction` of the image (and its border)
+    /// instead of what is salient: for measurements of the matcher.
+    #[must_use]
+    pub fn with_centred_roi(mut self, fraction: f32) -> Self {
+        self.roi.set_centred_rectangle(fraction);
+        self
+    }
+
+    /// Size of the processed views: the picture's size divided by `preprocess.scale`.
+    pub fn output_size(&self) -> Size {
+        self.preprocess.output_size()
+    }
+
+    /// Forgets the previous frame and all tracks, as after a jump in time.
+    pub fn reset(&mut self) {
+        self.previous.clear();
+        self.track.reset();
+    }
+
+    /// One frame through all stages. Allocates nothing once every buffer has
+    /// met its largest frame.
+    pub fn process(&mut self, frame: &StereoFrame, out: &mut Perception) {
+        let mut lap = Lap::start(self.clock);
+
+        self.preprocess.run(frame, out, &mut self.right);
+        lap.mark(&mut out.times, Stage::Preprocess);
+
+        self.coarse.run(&out.left, &self.right, &mut self.coarse_disparity);
+        lap.mark(&mut out.times, Stage::Coarse);
+
+        let scene = Scene {
+            stamp: frame.stamp,
+            left: &out.left,
+            coarse: &self.coarse_disparity,
+            rig: &out.rig,
+        };
+        self.saliency.run(&scene, &mut self.previous, &mut self.attention, &mut out.saliency);
+        lap.mark(&mut out.times, Stage::Saliency);
+
+        self.roi.run(
+            &self.attention,
+            &out.saliency,
+            &self.coarse_disparity,
+            &out.rig,
+            &mut out.roi,
+        );
+        lap.mark(&mut out.times, Stage::Roi);
+
+        self.stereo.run(
+            &out.left,
+            &self.right,
+            &out.roi,
+            &out.saliency,
+            &self.coarse_disparity,
+            &mut self.matches,
+        );
+        lap.mark(&mut out.times, Stage::Stereo);
+
+        self.refine.run(&self.matches, &out.roi, &out.rig, &mut out.disparity, &mut out.confidence);
+        lap.mark(&mut out.times, Stage::Refine);
+
+        self.depth.run(&out.disparity, &out.rig, &mut out.depth);
+        lap.mark(&mut out.times, Stage::Depth);
+
+        let source = RegionSource {
+            saliency: &out.saliency,
+            roi: &out.roi,
+            disparity: &out.disparity,
+            confidence: &out.confidence,
+            depth: &out.depth,
+            rig: &out.rig,
+        };
+        self.regions.run(&source, &mut out.labels, &mut out.regions, &mut out.rejections);
+        lap.mark(&mut out.times, Stage::Regions);
+
+        self.track.run(frame.stamp, &out.rig, &mut out.regions, &mut out.rejections);
+        lap.mark(&mut out.times, Stage::Track);
+    }
+}
+
+/// The time between two marks.
+struct Lap {
+    clock: Clock,
+    last: u64,
+}
+
+impl Lap {
+    fn start(clock: Clock) -> Self {
+        Self { clock, last: clock.now() }
+    }
+
+    fn mark(&mut self, times: &mut StageTimes, stage: Stage) {
+        let now = self.clock.now();
+        times.set(stage, (now - self.last) as f64 * 1e-6);
+        self.last = now;
+    }
+}

@@ -1,0 +1,1 @@
+//! Everything that only ROS 2 knows: messages, conversions, parameters, the node.

@@ -1,0 +1,11 @@
+//! The stages of the method: one file, one noun, one verb each.
+
+pub mod coarse;
+pub mod depth;
+pub mod preprocess;
+pub mod refine;
+pub mod regions;
+pub mod roi;
+pub mod saliency;
+pub mod stereo;
+pub mod track;
