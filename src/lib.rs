@@ -22,6 +22,8 @@
 
 pub mod camera;
 pub mod config;
+#[cfg(feature = "tool")]
+pub mod drive;
 pub mod error;
 pub mod image;
 #[cfg(feature = "tool")]
