@@ -1,5 +1,7 @@
 //! From pictures to the views that all other stages read.
 
+pub mod gradient;
+
 use std::sync::Arc;
 
 use crate::config::Config;

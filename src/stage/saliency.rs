@@ -1,14 +1,24 @@
-//! The attention map.
+//! The attention map: where in view something matters.
+//!
+//! All attention work is done at one value per cell of [`CELL`] pixels; a
+//! quarter-size view of the left image is made once per frame and shared by
+//! every cue. The map is smoothed over time and brought to full size at the end.
+
+mod cells;
+mod upsample;
+
+pub use cells::shrink_view;
+pub use upsample::upsample;
 
 use crate::camera::StereoRig;
-use crate::config::Config;
+use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
 use crate::perception::View;
 use crate::simd::Level;
 use crate::stage::coarse::{CELL, CoarseDisparity};
 use crate::stamp::Stamp;
 
-/// What the cues look at.
+/// What the stage is given.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
     /// Time of the frame.
@@ -21,28 +31,100 @@ pub struct Scene<'a> {
     pub rig: &'a StereoRig,
 }
 
+/// What the cues look at: the scene, its quarter-size view, and the frame before.
+#[derive(Clone, Copy)]
+pub struct AttentionScene<'a> {
+    /// Time of the frame.
+    pub stamp: Stamp,
+    /// Left view, full size.
+    pub left: &'a View,
+    /// Left view at one pixel per cell: means over [`CELL`] x [`CELL`] pixels.
+    pub cells: &'a View,
+    /// Disparity per cell of the same frame, in full-size pixels.
+    pub coarse: &'a CoarseDisparity,
+    /// Calibration of the full-size views.
+    pub rig: &'a StereoRig,
+    /// The frame before; `None` on the first frame and after a reset, when
+    /// whoever keeps a state of its own starts anew.
+    pub previous: Option<&'a PreviousFrame>,
+}
+
+/// What is remembered of one frame.
+#[derive(Clone, Debug, Default)]
+pub struct PreviousFrame {
+    /// Its time.
+    pub stamp: Stamp,
+    /// Its left gray view, one pixel per cell.
+    pub gray: Image<u8>,
+    /// Its attention map after smoothing, one value per cell.
+    pub attention: Image<f32>,
+}
+
 /// The register of the previous frame.
 #[derive(Debug, Default)]
 pub struct Previous {
-    stamp: Option<Stamp>,
+    frame: PreviousFrame,
+    is_set: bool,
 }
 
 impl Previous {
     /// Forgets the previous frame.
     pub fn clear(&mut self) {
-        self.stamp = None;
+        self.is_set = false;
     }
+
+    /// The previous frame, if there is one of the wanted cell map size.
+    fn get(&self, cells: Size) -> Option<&PreviousFrame> {
+        (self.is_set && self.frame.gray.size() == cells && self.frame.attention.size() == cells)
+            .then_some(&self.frame)
+    }
+
+    fn set(&mut self, stamp: Stamp, gray: &Image<u8>, attention: &Image<f32>) {
+        self.frame.stamp = stamp;
+        self.frame.gray.copy_from(gray);
+        self.frame.attention.copy_from(attention);
+        self.is_set = true;
+    }
+}
+
+/// One conspicuity map.
+pub trait Cue {
+    /// Writes how conspicuous each cell is, 0..=1 on a fixed physical scale
+    /// that the cue documents: never stretched to the map's own range, so that
+    /// a cue without evidence stays near 0.
+    fn conspicuity(&mut self, scene: &AttentionScene<'_>, out: &mut Image<f32>);
+}
+
+/// One way to make the attention map.
+enum Mode {
+    FullFrame,
 }
 
 /// The attention stage.
 pub struct Saliency {
     size: Size,
+    mode: Mode,
+    smoothing: f32,
+    cells: View,
 }
 
 impl Saliency {
     /// The stage for views of `size`.
-    pub fn new(_config: &Config, size: Size, _level: Level) -> Self {
-        Self { size }
+    pub fn new(config: &Config, size: Size, _level: Level) -> Self {
+        let mode = match config.saliency.mode {
+            // Geometry first comes into this arm: Scene => Mode::Scene(SceneSaliency::new(..)).
+            SaliencyMode::Scene
+            | SaliencyMode::Paper
+            | SaliencyMode::FrequencyTuned
+            | SaliencyMode::SpectralResidual
+            | SaliencyMode::FullFrame => Mode::FullFrame,
+        };
+        Self {
+            size,
+            mode,
+            smoothing: config.saliency.temporal_smoothing as f32,
+            cells: View::default(),
+        }
     }
 
     /// Writes S, 0..=1, per cell of [`CELL`] pixels into `attention` and for
@@ -54,10 +136,72 @@ impl Saliency {
         attention: &mut Image<f32>,
         saliency: &mut Image<f32>,
     ) {
-        previous.stamp = Some(scene.stamp);
-        attention.resize(self.size.divided_by(CELL));
-        attention.fill(1.0);
+        let cells = self.size.divided_by(CELL);
+        attention.resize(cells);
         saliency.resize(self.size);
-        saliency.fill(1.0);
+        if matches!(self.mode, Mode::FullFrame) {
+            attention.fill(1.0);
+            saliency.fill(1.0);
+            return;
+        }
+        shrink_view(scene.left, &mut self.cells);
+        let before = previous.get(cells);
+        let scene = AttentionScene {
+            stamp: scene.stamp,
+            left: scene.left,
+            cells: &self.cells,
+            coarse: scene.coarse,
+            rig: scene.rig,
+            previous: before,
+        };
+        // The flow that carries the previous map to this frame, for the modes that know one.
+        let flow: Option<&Image<[f32; 2]>> = None;
+        match &mut self.mode {
+            Mode::FullFrame => {}
+        }
+        if let Some(before) = before {
+            smooth(attention, &before.attention, flow, self.smoothing);
+        }
+        previous.set(scene.stamp, &self.cells.gray, attention);
+        upsample(attention, self.size, saliency);
     }
+}
+
+/// S̄ = (1 - a) S + a S̄_prev. With `flow`, S̄_prev is read where each cell was
+/// in the previous frame: `flow` points there, in cells.
+fn smooth(
+    attention: &mut Image<f32>,
+    before: &Image<f32>,
+    flow: Option<&Image<[f32; 2]>>,
+    share: f32,
+) {
+    if share <= 0.0 {
+        return;
+    }
+    let Some(flow) = flow.filter(|flow| flow.size() == attention.size()) else {
+        for (now, before) in attention.pixels_mut().iter_mut().zip(before.pixels()) {
+            *now += share * (before - *now);
+        }
+        return;
+    };
+    for y in 0..attention.height() {
+        let flow = flow.row(y);
+        for (x, now) in attention.row_mut(y).iter_mut().enumerate() {
+            let [dx, dy] = flow[x];
+            let before = sample(before, x as f32 + dx, y as f32 + dy);
+            *now += share * (before - *now);
+        }
+    }
+}
+
+/// Bilinear value at `(x, y)`, coordinates limited to the image.
+fn sample(image: &Image<f32>, x: f32, y: f32) -> f32 {
+    let x = x.clamp(0.0, (image.width() - 1) as f32);
+    let y = y.clamp(0.0, (image.height() - 1) as f32);
+    let (x0, y0) = (x as usize, y as usize);
+    let (x1, y1) = ((x0 + 1).min(image.width() - 1), (y0 + 1).min(image.height() - 1));
+    let (fx, fy) = (x - x0 as f32, y - y0 as f32);
+    let upper = image.get(x0, y0) + fx * (image.get(x1, y0) - image.get(x0, y0));
+    let lower = image.get(x0, y1) + fx * (image.get(x1, y1) - image.get(x0, y1));
+    upper + fy * (lower - upper)
 }
