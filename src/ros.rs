@@ -1,1 +1,4 @@
 //! Everything that only ROS 2 knows: messages, conversions, parameters, the node.
+
+pub mod cdr;
+pub mod message;

@@ -1,0 +1,7 @@
+//! The integration tests: one crate, so that they link once. The modules are
+//! in `tests/it/`.
+
+mod it {
+    #[cfg(feature = "tool")]
+    mod vectors;
+}
