@@ -167,8 +167,8 @@ impl Saliency {
     }
 }
 
-/// S̄ = (1 - a) S + a S̄_prev. With `flow`, S̄_prev is read where each cell was
-/// in the previous frame: `flow` points there, in cells.
+/// (1 - a) of this frame's map and a of the one before. With `flow` the latter is
+/// read where each cell was in the previous frame: `flow` points there, in cells.
 fn smooth(
     attention: &mut Image<f32>,
     before: &Image<f32>,
