@@ -15,6 +15,7 @@
 //! | [`pipeline`], [`stage`] | the method: one frame in, one perception out |
 //! | `output` | doors out: live topics, bags, the HTML report |
 //! | `ros` | messages, conversions, parameters, the node |
+//! | `metric` | what the field measures, and stage times over many frames |
 //! | `drive`, `command` | sources paired with sinks, and the command line |
 //!
 //! Without the default feature `tool` only the core remains, which knows no
@@ -28,6 +29,8 @@ pub mod error;
 pub mod image;
 #[cfg(feature = "tool")]
 pub mod input;
+#[cfg(feature = "tool")]
+pub mod metric;
 #[cfg(feature = "tool")]
 pub mod output;
 pub mod perception;
