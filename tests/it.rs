@@ -3,5 +3,7 @@
 
 mod it {
     #[cfg(feature = "tool")]
+    mod params;
+    #[cfg(feature = "tool")]
     mod vectors;
 }

@@ -1,0 +1,48 @@
+//! The shipped parameter files agree with the code.
+
+use std::path::PathBuf;
+
+use salient_stereo::config::Config;
+use salient_stereo::ros::params::{self, apply, read_file};
+
+fn config_dir() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("config")
+}
+
+/// `SALIENT_STEREO_UPDATE=1 cargo test --test it params::` writes the file anew.
+#[test]
+fn the_shipped_file_is_the_default_configuration() {
+    let file = config_dir().join("salient_stereo.yaml");
+    let wanted = params::to_yaml(&Config::default());
+    if std::env::var_os("SALIENT_STEREO_UPDATE").is_some() {
+        std::fs::write(&file, &wanted).unwrap();
+    }
+    let found = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(
+        found == wanted,
+        "config/salient_stereo.yaml differs from Config::default(); SALIENT_STEREO_UPDATE=1 cargo test --test it params:: writes it anew"
+    );
+    let all = read_file(&file).unwrap();
+    let (config, warnings) = apply(&Config::default(), &all, "/salient_stereo").unwrap();
+    assert_eq!(config, Config::default());
+    assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+#[test]
+fn every_overlay_loads_and_holds_only_what_differs() {
+    let default = Config::default();
+    for name in ["road", "indoor", "low_power"] {
+        let all = read_file(&config_dir().join(format!("{name}.yaml"))).unwrap();
+        assert!(!all.is_empty());
+        let (config, warnings) = apply(&default, &all, "/salient_stereo").unwrap();
+        assert!(warnings.is_empty(), "{name}: {warnings:?}");
+        for assignment in &all {
+            assert_ne!(
+                config.value(&assignment.name).unwrap(),
+                default.value(&assignment.name).unwrap(),
+                "{name}: {} has its default",
+                assignment.name
+            );
+        }
+    }
+}
