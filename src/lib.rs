@@ -11,7 +11,7 @@
 //! |---|---|
 //! | [`config`], [`error`], [`stamp`], [`image`], [`camera`], [`perception`], [`simd`] | the nouns |
 //! | `input` | doors in: live topics, bags, dataset folders, the renderer |
-//! | `sync` | pairs left, right and camera infos by stamp |
+//! | [`sync`] | pairs left, right and camera infos by stamp |
 //! | [`pipeline`], [`stage`] | the method: one frame in, one perception out |
 //! | `output` | doors out: live topics, bags, the HTML report |
 //! | `ros` | messages, conversions, parameters, the node |
@@ -40,3 +40,4 @@ pub mod ros;
 pub mod simd;
 pub mod stage;
 pub mod stamp;
+pub mod sync;

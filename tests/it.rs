@@ -4,6 +4,7 @@
 mod it {
     #[cfg(feature = "tool")]
     mod params;
+    mod sync;
     #[cfg(feature = "tool")]
     mod vectors;
 }
