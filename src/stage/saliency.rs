@@ -5,6 +5,16 @@
 //! every cue. The map is smoothed over time and brought to full size at the end.
 
 mod cells;
+pub mod color;
+pub mod depth;
+pub mod frequency_tuned;
+pub mod integral;
+pub mod intensity;
+pub mod motion;
+pub mod normalize;
+pub mod orientation;
+pub mod paper;
+pub mod spectral_residual;
 mod upsample;
 
 pub use cells::shrink_view;
@@ -17,6 +27,10 @@ use crate::perception::View;
 use crate::simd::Level;
 use crate::stage::coarse::{CELL, CoarseDisparity};
 use crate::stamp::Stamp;
+
+use frequency_tuned::FrequencyTuned;
+use paper::Paper;
+use spectral_residual::SpectralResidual;
 
 /// What the stage is given.
 #[derive(Clone, Copy)]
@@ -97,6 +111,9 @@ pub trait Cue {
 
 /// One way to make the attention map.
 enum Mode {
+    Paper(Box<Paper>),
+    FrequencyTuned(Box<FrequencyTuned>),
+    SpectralResidual(Box<SpectralResidual>),
     FullFrame,
 }
 
@@ -112,12 +129,13 @@ impl Saliency {
     /// The stage for views of `size`.
     pub fn new(config: &Config, size: Size, _level: Level) -> Self {
         let mode = match config.saliency.mode {
-            // Geometry first comes into this arm: Scene => Mode::Scene(SceneSaliency::new(..)).
-            SaliencyMode::Scene
-            | SaliencyMode::Paper
-            | SaliencyMode::FrequencyTuned
-            | SaliencyMode::SpectralResidual
-            | SaliencyMode::FullFrame => Mode::FullFrame,
+            // Geometry first goes into an arm of its own: Mode::Scene(SceneSaliency).
+            SaliencyMode::Scene | SaliencyMode::Paper => {
+                Mode::Paper(Box::new(Paper::new(&config.saliency.paper)))
+            }
+            SaliencyMode::FrequencyTuned => Mode::FrequencyTuned(Box::default()),
+            SaliencyMode::SpectralResidual => Mode::SpectralResidual(Box::default()),
+            SaliencyMode::FullFrame => Mode::FullFrame,
         };
         Self {
             size,
@@ -157,6 +175,9 @@ impl Saliency {
         // The flow that carries the previous map to this frame, for the modes that know one.
         let flow: Option<&Image<[f32; 2]>> = None;
         match &mut self.mode {
+            Mode::Paper(paper) => paper.run(&scene, attention),
+            Mode::FrequencyTuned(frequency_tuned) => frequency_tuned.run(&scene, attention),
+            Mode::SpectralResidual(residual) => residual.run(&scene, attention),
             Mode::FullFrame => {}
         }
         if let Some(before) = before {
