@@ -192,6 +192,7 @@ pub fn drive<S: FrameSource + Send>(
     });
     let mut finished = Ok(());
     for sink in sinks.iter_mut() {
+        sink.note_tally_any(source.tally());
         finished = finished.and(sink.finish_any().map_err(DriveError::Sink));
     }
     let ending = outcome?;

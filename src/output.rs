@@ -1,6 +1,9 @@
 //! Doors out: where perceptions go.
 
-use crate::input::Observation;
+pub mod picture;
+pub mod score;
+
+use crate::input::{Observation, Tally};
 use crate::perception::Perception;
 
 /// A consumer of perceptions.
@@ -17,6 +20,10 @@ pub trait Sink {
         observation: &Observation,
         perception: &Perception,
     ) -> Result<(), Self::Error>;
+
+    /// Takes note of what the source has met, before [`Sink::finish`]. Most
+    /// sinks have no use for it.
+    fn note_tally(&mut self, _tally: &Tally) {}
 
     /// Completes the output: afterwards it is whole and readable. Called once,
     /// also after an interruption.
@@ -39,6 +46,9 @@ pub trait AnySink {
         perception: &Perception,
     ) -> Result<(), Box<dyn std::error::Error + Send + Sync>>;
 
+    /// As [`Sink::note_tally`].
+    fn note_tally_any(&mut self, tally: &Tally);
+
     /// As [`Sink::finish`].
     ///
     /// # Errors
@@ -53,6 +63,10 @@ impl<S: Sink> AnySink for S {
         perception: &Perception,
     ) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         Ok(self.write(observation, perception)?)
+    }
+
+    fn note_tally_any(&mut self, tally: &Tally) {
+        self.note_tally(tally);
     }
 
     fn finish_any(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {

@@ -3,7 +3,11 @@
 
 mod it {
     #[cfg(feature = "tool")]
+    mod metric;
+    #[cfg(feature = "tool")]
     mod params;
+    #[cfg(feature = "tool")]
+    mod picture;
     mod sync;
     #[cfg(feature = "tool")]
     mod vectors;
