@@ -2,13 +2,16 @@
 //! in `tests/it/`.
 
 mod it {
+    mod depth;
     #[cfg(feature = "tool")]
     mod metric;
     #[cfg(feature = "tool")]
     mod params;
     #[cfg(feature = "tool")]
     mod picture;
+    mod regions;
     mod sync;
+    mod track;
     #[cfg(feature = "tool")]
     mod vectors;
 }

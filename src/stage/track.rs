@@ -1,35 +1,231 @@
 //! Identity of regions over frames.
 
+pub mod follow;
+pub mod kalman;
+
 use crate::camera::StereoRig;
 use crate::config::Config;
-use crate::perception::{RegionList, Rejections};
+use crate::perception::{Region, RegionList, Rejections, TrackState};
 use crate::stamp::Stamp;
+use follow::{Box2, Follow};
 
-/// The tracker.
+/// Squared Mahalanobis distance beyond which two positions are not the same
+/// point: 99.9 % of the chi-squared distribution with 3 degrees of freedom.
+const GATE: f64 = 16.27;
+/// Where boxes overlap too little, positions may continue a track up to this
+/// many times the larger lateral extent of the object.
+const REACH: f64 = 1.5;
+/// Largest ratio of the boxes' areas in that case.
+const MAX_GROWTH: f32 = 2.0;
+/// A longer time between two frames in seconds is another recording.
+const LONGEST_GAP: f64 = 5.0;
+
+/// A track and a region that may be the same thing.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    score: f32,
+    track: u32,
+    region: u32,
+}
+
+/// The tracker: association by overlap of the predicted box and by distance in
+/// space, the best pair first; a constant-velocity Kalman filter per track.
 pub struct Track {
+    enabled: bool,
+    min_iou: f32,
+    confirm: u32,
+    max_age: f64,
+    max_count: usize,
     last: Option<Stamp>,
+    next_id: u32,
+    tracks: Vec<Follow>,
+    pairs: Vec<Pair>,
+    taken: Vec<bool>,
+    order: Vec<(u32, u32)>,
 }
 
 impl Track {
     /// The stage with the parameters `tracking.*`.
-    pub fn new(_config: &Config) -> Self {
-        Self { last: None }
+    pub fn new(config: &Config) -> Self {
+        Self {
+            enabled: config.tracking.enabled,
+            min_iou: config.tracking.min_iou as f32,
+            confirm: u32::try_from(config.tracking.confirm).unwrap_or(1),
+            max_age: config.tracking.max_age,
+            max_count: usize::try_from(config.regions.max_count).unwrap_or(1),
+            last: None,
+            next_id: 1,
+            tracks: Vec::new(),
+            pairs: Vec::new(),
+            taken: Vec::new(),
+            order: Vec::new(),
+        }
     }
 
-    /// Forgets all tracks.
+    /// Forgets all tracks; ids start again from 1.
     pub fn reset(&mut self) {
         self.last = None;
+        self.next_id = 1;
+        for track in &mut self.tracks {
+            track.alive = false;
+        }
     }
 
-    /// Gives ids, states, ages and velocities to `regions`, removes those
-    /// without temporal support and counts them.
+    /// Gives ids, states, ages and velocities to `regions`.
+    ///
+    /// A new track is NEW until it was seen in `tracking.confirm` of the last
+    /// three frames, then ACTIVE. An active track that is not seen is appended,
+    /// oldest first, as COASTED for up to `tracking.max_age` seconds, at its
+    /// predicted place: it takes the next free label, which no pixel of the
+    /// label image has; its disparity and depth are NaN (not measured) and its
+    /// confidence falls to one half over that time. A track that ends without
+    /// ever having been active is counted as `unstable`.
+    ///
+    /// A stamp that goes back, or more than 5 s ahead, resets the tracker.
     pub fn run(
         &mut self,
         stamp: Stamp,
-        _rig: &StereoRig,
-        _regions: &mut RegionList,
-        _rejections: &mut Rejections,
+        rig: &StereoRig,
+        regions: &mut RegionList,
+        rejections: &mut Rejections,
     ) {
+        if !self.enabled {
+            return;
+        }
+        let dt = self.last.map_or(0.0, |last| stamp.seconds_since(last));
+        if !(0.0..=LONGEST_GAP).contains(&dt) {
+            self.reset();
+        }
         self.last = Some(stamp);
+        for track in self.tracks.iter_mut().filter(|t| t.alive) {
+            track.predict(dt);
+        }
+        self.associate(stamp, regions);
+        self.begin(stamp, regions);
+        self.end(stamp, rejections);
+        for region in regions.iter_mut() {
+            self.describe(stamp, region);
+        }
+        self.coast(stamp, rig, regions);
     }
+
+    /// Continues tracks with regions, the best pairs first.
+    fn associate(&mut self, stamp: Stamp, regions: &mut RegionList) {
+        self.pairs.clear();
+        for (i, track) in self.tracks.iter().enumerate().filter(|(_, t)| t.alive) {
+            for (j, region) in regions.iter().enumerate() {
+                if let Some(score) = affinity(track, region, self.min_iou) {
+                    self.pairs.push(Pair { score, track: i as u32, region: j as u32 });
+                }
+            }
+        }
+        self.pairs.sort_unstable_by(|a, b| {
+            b.score.total_cmp(&a.score).then((a.track, a.region).cmp(&(b.track, b.region)))
+        });
+        self.taken.clear();
+        self.taken.resize(regions.len(), false);
+        for pair in &self.pairs {
+            let track = &mut self.tracks[pair.track as usize];
+            let taken = &mut self.taken[pair.region as usize];
+            if !track.seen && !*taken {
+                let region = &mut regions[pair.region as usize];
+                track.observe(stamp, region, self.confirm);
+                region.track_id = track.id;
+                *taken = true;
+            }
+        }
+    }
+
+    /// Starts tracks for the regions that continue none.
+    fn begin(&mut self, stamp: Stamp, regions: &mut RegionList) {
+        let mut slot = 0;
+        for (region, _) in regions.iter_mut().zip(&self.taken).filter(|(_, taken)| !**taken) {
+            while self.tracks.get(slot).is_some_and(|t| t.alive) {
+                slot += 1;
+            }
+            if slot == self.tracks.len() {
+                self.tracks.push(Follow::default());
+            }
+            region.track_id = self.next_id;
+            self.tracks[slot].start(self.next_id, stamp, region);
+            self.next_id = self.next_id.checked_add(1).unwrap_or(1);
+        }
+    }
+
+    /// Ends tracks that were not seen for too long.
+    fn end(&mut self, stamp: Stamp, rejections: &mut Rejections) {
+        for track in self.tracks.iter_mut().filter(|t| t.alive && !t.seen) {
+            if track.is_hopeless() || track.unseen_for(stamp) > self.max_age {
+                track.alive = false;
+                rejections.unstable += u32::from(!track.active);
+            }
+        }
+    }
+
+    fn describe(&self, stamp: Stamp, region: &mut Region) {
+        let Some(track) = self.tracks.iter().find(|t| t.alive && t.id == region.track_id) else {
+            return;
+        };
+        // With `confirm` 1 the first frame is still the first one.
+        let active = track.active;
+        region.track_state = if active { TrackState::Active } else { TrackState::New };
+        region.track_age = track.age(stamp);
+        region.velocity = track.velocity();
+    }
+
+    /// Appends the active tracks that were not seen.
+    fn coast(&mut self, stamp: Stamp, rig: &StereoRig, regions: &mut RegionList) {
+        self.order.clear();
+        for (i, track) in self.tracks.iter().enumerate() {
+            if track.alive && !track.seen && track.active {
+                self.order.push((track.id, i as u32));
+            }
+        }
+        self.order.sort_unstable();
+        for &(id, slot) in &self.order {
+            if regions.len() >= self.max_count {
+                return;
+            }
+            let label = regions.len() as u16 + 1;
+            let track = &mut self.tracks[slot as usize];
+            let region = regions.push_empty();
+            if !track.coast(rig.left.size, region) {
+                // It has left the image.
+                track.alive = false;
+                regions.truncate(regions.len() - 1);
+                continue;
+            }
+            let missed = (track.unseen_for(stamp) / self.max_age).min(1.0) as f32;
+            region.label = label;
+            region.confidence = track.last.confidence * (1.0 - 0.5 * missed);
+            region.track_id = id;
+            region.track_state = TrackState::Coasted;
+            region.track_age = track.age(stamp);
+        }
+    }
+}
+
+/// How well a region continues a track, higher is better; `None` when it does not.
+///
+/// Boxes that overlap by `min_iou` score `1 + IoU`, lowered by the distance in
+/// space; boxes that do not score by that distance alone, if it is small
+/// against the object itself.
+fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
+    let bounds = Box2::of(region);
+    let iou = track.bounds.iou(&bounds);
+    let distance = track.distance(region);
+    if distance.is_some_and(|d| d > GATE) {
+        return None;
+    }
+    if iou >= min_iou && iou > 0.0 {
+        return Some((1.0 + iou) / (1.0 + distance.unwrap_or(0.0) / GATE) as f32);
+    }
+    let (kalman, distance) = (track.kalman.as_ref()?, distance?);
+    let estimate = kalman.position();
+    let metres = (0..3).map(|i| (estimate[i] - region.position[i]).powi(2)).sum::<f64>().sqrt();
+    let lateral = region.extent[0].max(region.extent[1]);
+    let areas = (track.bounds.width * track.bounds.height, bounds.width * bounds.height);
+    let growth = (areas.0 / areas.1).max(areas.1 / areas.0);
+    (metres <= REACH * lateral && growth <= MAX_GROWTH)
+        .then_some(0.5 / (1.0 + distance / GATE) as f32)
 }

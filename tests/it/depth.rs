@@ -1,0 +1,42 @@
+//! Depth from disparity: eq. 2 and the special values of REP 117.
+
+use salient_stereo::camera::{Camera, StereoRig};
+use salient_stereo::config::Config;
+use salient_stereo::image::{Image, Size};
+use salient_stereo::stage::depth::Depth;
+
+const F: f64 = 700.0;
+const BASELINE: f64 = 0.5;
+
+fn depth_of(disparities: &[f32]) -> Vec<f32> {
+    let size = Size::new(disparities.len(), 1);
+    let rig = StereoRig::new(
+        Camera::pinhole(size, F, 5.0, 0.0, 0.0),
+        Camera::pinhole(size, F, 5.0, 0.0, -F * BASELINE),
+        0.0,
+    )
+    .unwrap();
+    let disparity = Image::from_vec(size, disparities.to_vec()).unwrap();
+    let mut depth = Image::default();
+    Depth::new(&Config::default()).run(&disparity, &rig, &mut depth);
+    depth.into_vec()
+}
+
+#[test]
+fn depth_is_focal_length_times_baseline_over_disparity() {
+    for (d, z) in [5.0_f32, 7.0, 35.03125, 350.0].iter().zip(depth_of(&[5.0, 7.0, 35.03125, 350.0]))
+    {
+        let plain = F * BASELINE / f64::from(*d);
+        assert!((f64::from(z) - plain).abs() < 1e-5 * plain, "{d}: {z} instead of {plain}");
+    }
+}
+
+#[test]
+fn limits_and_holes_are_told_apart() {
+    // fB = 350: 80 m is 4.375 px, 0.1 m is 3500 px.
+    let z = depth_of(&[f32::NAN, 4.3, 0.0, -0.0, -1.0, 3600.0, 4.4, 3499.0]);
+    assert!(z[0].is_nan());
+    assert_eq!(z[1..5], [f32::INFINITY; 4]);
+    assert_eq!(z[5], f32::NEG_INFINITY);
+    assert!(z[6].is_finite() && z[7].is_finite());
+}

@@ -1,0 +1,260 @@
+//! Tracks: identity through crossing, occlusion and jumps in time.
+
+use salient_stereo::camera::{Camera, StereoRig};
+use salient_stereo::config::Config;
+use salient_stereo::image::Size;
+use salient_stereo::perception::{RegionList, Rejections, TrackState};
+use salient_stereo::stage::track::Track;
+use salient_stereo::stamp::Stamp;
+
+const SIZE: Size = Size::new(640, 240);
+const F: f64 = 400.0;
+const BASELINE: f64 = 0.5;
+
+fn rig() -> StereoRig {
+    StereoRig::new(
+        Camera::pinhole(SIZE, F, 320.0, 120.0, 0.0),
+        Camera::pinhole(SIZE, F, 320.0, 120.0, -F * BASELINE),
+        0.0,
+    )
+    .unwrap()
+}
+
+/// A box of `size` metres at (x, y, z) metres, as the region former would see it.
+#[derive(Clone, Copy)]
+struct Thing {
+    at: [f64; 3],
+    size: [f64; 2],
+}
+
+fn see(things: &[Thing]) -> RegionList {
+    let mut list = RegionList::default();
+    for (i, thing) in things.iter().enumerate() {
+        let [x, y, z] = thing.at;
+        let (w, h) = (F * thing.size[0] / z, F * thing.size[1] / z);
+        let left = (320.0 + F * x / z - w / 2.0).clamp(0.0, 639.0).round();
+        let top = (120.0 + F * y / z - h / 2.0).clamp(0.0, 239.0).round();
+        let r = list.push_empty();
+        r.label = i as u16 + 1;
+        (r.x, r.y) = (left as u32, top as u32);
+        (r.width, r.height) = ((w as u32).min(640 - r.x).max(1), (h as u32).min(240 - r.y).max(1));
+        r.mask.resize((r.width * r.height) as usize, 255);
+        r.area = r.width * r.height;
+        let (right, bottom) = ((r.x + r.width - 1) as f32, (r.y + r.height - 1) as f32);
+        r.contour.extend([
+            [r.x as f32, r.y as f32],
+            [right, r.y as f32],
+            [right, bottom],
+            [r.x as f32, bottom],
+        ]);
+        r.position = thing.at;
+        let sigma_z = z * z / (F * BASELINE) * 0.2;
+        r.position_covariance = [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, sigma_z * sigma_z];
+        r.extent = [thing.size[0], thing.size[1], 0.5];
+        r.confidence = 0.8;
+        r.mean_saliency = 0.7;
+        r.median_depth = z as f32;
+        r.valid_fraction = 1.0;
+    }
+    list
+}
+
+struct Driver {
+    track: Track,
+    rig: StereoRig,
+    rejections: Rejections,
+}
+
+impl Driver {
+    fn new(config: &Config) -> Self {
+        Self { track: Track::new(config), rig: rig(), rejections: Rejections::default() }
+    }
+
+    fn frame(&mut self, seconds: f64, things: &[Thing]) -> RegionList {
+        let mut list = see(things);
+        self.rejections = Rejections::default();
+        self.track.run(Stamp::from_seconds(seconds), &self.rig, &mut list, &mut self.rejections);
+        list
+    }
+}
+
+fn person(x: f64, z: f64) -> Thing {
+    Thing { at: [x, 0.3, z], size: [0.6, 1.7] }
+}
+
+#[test]
+fn two_of_three_frames_make_a_track_active() {
+    let mut driver = Driver::new(&Config::default());
+    let first = driver.frame(0.0, &[person(0.0, 8.0)]);
+    assert_eq!((first[0].track_id, first[0].track_state), (1, TrackState::New));
+    assert!(first[0].velocity[0].is_nan() && first[0].track_age == 0.0);
+    assert!(driver.frame(0.1, &[]).is_empty(), "what was seen once does not coast");
+    let third = driver.frame(0.2, &[person(0.02, 8.0)]);
+    assert_eq!((third[0].track_id, third[0].track_state), (1, TrackState::Active));
+    assert!((third[0].track_age - 0.2).abs() < 1e-6 && third[0].velocity[0].is_finite());
+}
+
+#[test]
+fn three_of_three_and_one_of_three_are_honoured() {
+    for (confirm, active_at) in [(1, 2), (2, 2), (3, 3)] {
+        let mut config = Config::default();
+        config.tracking.confirm = confirm;
+        let mut driver = Driver::new(&config);
+        for frame in 1..=4 {
+            let list = driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
+            let expected = if frame < active_at { TrackState::New } else { TrackState::Active };
+            assert_eq!(list[0].track_state, expected, "confirm {confirm}, frame {frame}");
+        }
+    }
+}
+
+#[test]
+fn a_flicker_is_counted_as_unstable() {
+    let mut driver = Driver::new(&Config::default());
+    driver.frame(0.0, &[person(0.0, 8.0)]);
+    driver.frame(0.1, &[]);
+    assert_eq!(driver.rejections.unstable, 0);
+    driver.frame(0.2, &[]);
+    assert_eq!(driver.rejections.unstable, 1);
+    let again = driver.frame(0.3, &[person(0.0, 8.0)]);
+    assert_eq!(again[0].track_id, 2, "an id is never used again");
+}
+
+#[test]
+fn crossing_objects_keep_their_ids() {
+    let mut driver = Driver::new(&Config::default());
+    let at = |t: f64| [person(-2.0 + 2.0 * t, 6.0), person(2.0 - 2.0 * t, 9.0)];
+    for frame in 0..=20 {
+        let t = f64::from(frame) * 0.1;
+        let list = driver.frame(t, &at(t));
+        assert_eq!(list.iter().map(|r| r.track_id).collect::<Vec<_>>(), [1, 2], "frame {frame}");
+    }
+}
+
+#[test]
+fn crossing_objects_keep_their_ids_when_the_far_one_is_hidden() {
+    let mut driver = Driver::new(&Config::default());
+    let (mut last, mut coasted) = (Vec::new(), 0);
+    for frame in 0..=24 {
+        let t = f64::from(frame) * 0.1;
+        let (near, far) = (person(-2.0 + 1.6 * t, 6.0), person(2.0 - 1.6 * t, 9.0));
+        let apart = (near.at[0] / near.at[2] - far.at[0] / far.at[2]).abs();
+        let both = [near, far];
+        let list = driver.frame(t, &both[..if apart < 0.07 { 1 } else { 2 }]);
+        coasted += list.iter().filter(|r| r.track_state == TrackState::Coasted).count();
+        last = list.iter().map(|r| r.track_id).collect();
+        assert_eq!(last, [1, 2], "frame {frame}");
+    }
+    assert!(coasted > 0 && last == [1, 2]);
+}
+
+#[test]
+fn a_short_occlusion_coasts_and_a_long_one_ends() {
+    let mut driver = Driver::new(&Config::default());
+    let at = |t: f64| person(-1.5 + 1.5 * t, 8.0);
+    for frame in 0..10 {
+        driver.frame(f64::from(frame) * 0.1, &[at(f64::from(frame) * 0.1)]);
+    }
+    for frame in 10..15 {
+        let t = f64::from(frame) * 0.1;
+        let other = person(3.0, 5.0);
+        let list = driver.frame(t, &[other]);
+        let r = &list[1];
+        assert_eq!((r.track_id, r.track_state, r.label), (1, TrackState::Coasted, 2));
+        assert!((r.position[0] - at(t).at[0]).abs() < 0.15, "{} {}", r.position[0], at(t).at[0]);
+        let centre = f64::from(r.x) + f64::from(r.width) / 2.0;
+        assert!((centre - (320.0 + F * at(t).at[0] / 8.0)).abs() < 8.0, "frame {frame}: {centre}");
+        assert_eq!(r.mask.len() as u32, r.width * r.height);
+        assert!(r.mean_depth.is_nan() && r.valid_fraction == 0.0);
+        assert!((r.velocity[0] - 1.5).abs() < 0.3 && r.confidence < 0.8);
+    }
+    let back = driver.frame(1.5, &[at(1.5), person(3.0, 5.0)]);
+    assert_eq!(back[0].track_id, 1);
+    for frame in 16..21 {
+        driver.frame(f64::from(frame) * 0.1, &[]);
+    }
+    let gone = driver.frame(2.15, &[]);
+    assert!(gone.is_empty(), "older than tracking.max_age");
+}
+
+#[test]
+fn a_region_that_leaves_the_image_is_cut_and_then_ends() {
+    let mut config = Config::default();
+    config.tracking.max_age = 3.0;
+    let mut driver = Driver::new(&config);
+    for frame in 0..6 {
+        let t = f64::from(frame) * 0.1;
+        driver.frame(t, &[person(2.0 + 4.0 * t, 6.0)]);
+    }
+    let mut widths = Vec::new();
+    for frame in 6..14 {
+        let list = driver.frame(f64::from(frame) * 0.1, &[]);
+        for r in list.iter() {
+            assert!(r.x + r.width <= 640 && r.mask.len() as u32 == r.width * r.height);
+            assert!(r.contour.iter().all(|p| p[0] >= r.x as f32 && p[0] < (r.x + r.width) as f32));
+            widths.push(r.width);
+        }
+    }
+    assert!(!widths.is_empty() && widths.len() < 8 && widths.windows(2).all(|w| w[1] <= w[0]));
+}
+
+#[test]
+fn velocity_comes_out_of_the_filter() {
+    let mut driver = Driver::new(&Config::default());
+    let mut last = [0.0; 3];
+    for frame in 0..30 {
+        let t = f64::from(frame) * 0.1;
+        last = driver.frame(t, &[person(-1.0 + 0.8 * t, 14.0 - 2.0 * t)])[0].velocity;
+    }
+    assert!((last[0] - 0.8).abs() < 0.05 && (last[2] + 2.0).abs() < 0.1, "{last:?}");
+}
+
+#[test]
+fn jumps_in_time_reset() {
+    for jump in [-0.05, 60.0] {
+        let mut driver = Driver::new(&Config::default());
+        for frame in 0..3 {
+            driver.frame(10.0 + f64::from(frame) * 0.1, &[person(0.0, 8.0), person(2.0, 8.0)]);
+        }
+        let list = driver.frame(10.2 + jump, &[person(2.0, 8.0)]);
+        assert_eq!((list.len(), list[0].track_id, list[0].track_state), (1, 1, TrackState::New));
+    }
+}
+
+#[test]
+fn the_same_stamp_twice_changes_no_identity() {
+    let mut driver = Driver::new(&Config::default());
+    driver.frame(1.0, &[person(0.0, 8.0)]);
+    let list = driver.frame(1.0, &[person(0.0, 8.0)]);
+    assert_eq!(list[0].track_id, 1);
+    assert!(list[0].velocity.iter().all(|v| v.is_finite()));
+}
+
+#[test]
+fn regions_without_depth_are_followed_by_their_boxes() {
+    let mut track = Track::new(&Config::default());
+    let rig = rig();
+    for frame in 0..5 {
+        let mut list = see(&[person(-1.0 + 0.2 * f64::from(frame), 8.0), person(2.0, 8.0)]);
+        for r in list.iter_mut() {
+            r.position = [f64::NAN; 3];
+            r.position_covariance = [f64::NAN; 9];
+            r.extent = [f64::NAN; 3];
+        }
+        let stamp = Stamp::from_seconds(f64::from(frame) * 0.1);
+        track.run(stamp, &rig, &mut list, &mut Rejections::default());
+        assert_eq!(list.iter().map(|r| r.track_id).collect::<Vec<_>>(), [1, 2]);
+        assert!(list[0].velocity[0].is_nan());
+    }
+}
+
+#[test]
+fn switched_off_it_gives_no_ids() {
+    let mut config = Config::default();
+    config.tracking.enabled = false;
+    let mut driver = Driver::new(&config);
+    for frame in 0..3 {
+        let list = driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
+        assert_eq!((list[0].track_id, list[0].track_state), (0, TrackState::None));
+    }
+}
