@@ -1,21 +1,65 @@
 //! The region of interest (eq. 5).
 
+pub mod bits;
+pub mod budget;
+pub mod cells;
+pub mod threshold;
+
 use crate::camera::StereoRig;
-use crate::config::Config;
+use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
 use crate::perception::RoiMask;
 use crate::stage::coarse::CoarseDisparity;
 
+use bits::BitMask;
+use budget::Budget;
+use cells::{Components, retain_cells};
+use threshold::otsu;
+
+/// Radius in pixels of the opening: filaments of one and two pixels are cut.
+const OPENING: usize = 1;
+/// Radius in pixels of the closing: gaps of up to one cell are filled.
+const CLOSING: usize = 2;
+/// How far the coarse disparity is trusted, in pixels. Depth is judged again
+/// by the fine one; here nothing may be lost that it would accept.
+const SLACK: f32 = 1.0;
+
 /// Threshold, morphology, components, area budget, dilation.
 pub struct Roi {
     size: Size,
+    full_frame: bool,
     rectangle: Option<f32>,
+    threshold: Option<f32>,
+    depth_m: (f64, f64),
+    min_area: u32,
+    dilation: usize,
+    max_fraction: f64,
+    salient: BitMask,
+    matched: BitMask,
+    components: Components,
+    budget: Budget,
 }
 
 impl Roi {
     /// The stage for views of `size`.
-    pub fn new(_config: &Config, size: Size) -> Self {
-        Self { size, rectangle: None }
+    pub fn new(config: &Config, size: Size) -> Self {
+        Self {
+            size,
+            full_frame: config.saliency.mode == SaliencyMode::FullFrame,
+            rectangle: None,
+            threshold: match config.saliency.threshold_mode {
+                ThresholdMode::Fixed => Some(config.saliency.threshold as f32),
+                ThresholdMode::Otsu => None,
+            },
+            depth_m: (config.depth.min, config.depth.max),
+            min_area: u32::try_from(config.regions.min_area).unwrap_or(0),
+            dilation: usize::try_from(config.roi.dilation).unwrap_or(0),
+            max_fraction: config.roi.max_fraction,
+            salient: BitMask::default(),
+            matched: BitMask::default(),
+            components: Components::default(),
+            budget: Budget::default(),
+        }
     }
 
     /// From now on a centred rectangle of this share of the image, with its border.
@@ -24,18 +68,76 @@ impl Roi {
     }
 
     /// The mask from the attention map: `attention` per cell, `saliency` per pixel.
+    ///
+    /// `salient` is S >= τ where `depth.min` <= Z <= `depth.max` by the coarse disparity
+    /// (cells without one pass), opened and closed, less components smaller
+    /// than `regions.min_area`. `matched` is `salient` dilated by a square of
+    /// `roi.dilation` pixels to each side. When it exceeds `roi.max_fraction`,
+    /// both are cut to the most salient tiles.
     pub fn run(
         &mut self,
-        _attention: &Image<f32>,
-        _saliency: &Image<f32>,
-        _coarse: &CoarseDisparity,
-        _rig: &StereoRig,
+        attention: &Image<f32>,
+        saliency: &Image<f32>,
+        coarse: &CoarseDisparity,
+        rig: &StereoRig,
         out: &mut RoiMask,
     ) {
-        out.salient.resize(self.size);
-        out.salient.fill(255);
-        out.matched.resize(self.size);
-        out.matched.fill(255);
-        out.fraction = self.rectangle.unwrap_or(1.0);
+        if let Some(fraction) = self.rectangle {
+            self.mark_rectangle(f64::from(fraction));
+        } else if self.full_frame {
+            self.salient.reset(self.size);
+            self.salient.fill();
+            self.matched.copy_from(&self.salient);
+        } else {
+            let threshold = self.threshold.unwrap_or_else(|| otsu(attention));
+            self.salient.set_from(saliency, threshold);
+            self.gate_depth(coarse, rig);
+            self.salient.open(OPENING);
+            self.salient.close(CLOSING);
+            self.components.remove_small(&mut self.salient, self.min_area);
+            self.dilate();
+            self.keep_budget(attention);
+        }
+        self.salient.write(&mut out.salient);
+        self.matched.write(&mut out.matched);
+        out.fraction = self.matched.count() as f32 / self.size.area().max(1) as f32;
+    }
+
+    /// A rectangle of the image's aspect around its centre.
+    fn mark_rectangle(&mut self, fraction: f64) {
+        self.salient.reset(self.size);
+        let side = |length: usize| {
+            let part = (length as f64 * fraction.sqrt()).round() as usize;
+            let start = (length - part) / 2;
+            (start, start + part)
+        };
+        self.salient.set_rectangle(side(self.size.width), side(self.size.height));
+        self.dilate();
+    }
+
+    fn dilate(&mut self) {
+        self.matched.copy_from(&self.salient);
+        self.matched.dilate(self.dilation);
+    }
+
+    /// Keeps `Z_min <= Z <= Z_max`, as `f B / Z_max <= d <= f B / Z_min`.
+    fn gate_depth(&mut self, coarse: &CoarseDisparity, rig: &StereoRig) {
+        let offset = rig.disparity_offset() as f32;
+        let least = (rig.depth_scale() / self.depth_m.1) as f32 + offset - SLACK;
+        let most = (rig.depth_scale() / self.depth_m.0) as f32 + offset + SLACK;
+        retain_cells(&mut self.salient, |x, y| {
+            let d = coarse.checked.get(x, y);
+            // NaN is neither.
+            !(d < least || d > most)
+        });
+    }
+
+    fn keep_budget(&mut self, attention: &Image<f32>) {
+        let limit = (self.max_fraction * self.size.area() as f64) as usize;
+        if self.matched.count() > limit {
+            self.budget.choose(&self.matched, attention, limit);
+            self.budget.apply(&mut self.matched);
+            self.budget.apply(&mut self.salient);
+        }
     }
 }

@@ -1,0 +1,228 @@
+//! A mask of one bit per pixel: 64 pixels are dilated by one instruction.
+
+use rayon::prelude::*;
+
+use crate::image::{Image, Size};
+
+/// Pixels per word; pixel `x` of a row is bit `x % 64` of its word `x / 64`.
+const WORD: usize = u64::BITS as usize;
+
+/// A binary mask. The bits beyond the width are 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BitMask {
+    size: Size,
+    stride: usize,
+    words: Vec<u64>,
+}
+
+impl BitMask {
+    /// Changes the size and clears all bits.
+    pub fn reset(&mut self, size: Size) {
+        self.size = size;
+        self.stride = size.width.div_ceil(WORD);
+        self.words.clear();
+        self.words.resize(self.stride * size.height, 0);
+    }
+
+    /// Takes over size and bits of `other` and keeps the capacity.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.size = other.size;
+        self.stride = other.stride;
+        self.words.clear();
+        self.words.extend_from_slice(&other.words);
+    }
+
+    /// Width and height.
+    pub const fn size(&self) -> Size {
+        self.size
+    }
+
+    /// The words of row `y`.
+    pub fn row(&self, y: usize) -> &[u64] {
+        &self.words[y * self.stride..(y + 1) * self.stride]
+    }
+
+    /// The words of row `y`, to be written; bits beyond the width stay 0.
+    pub fn row_mut(&mut self, y: usize) -> &mut [u64] {
+        &mut self.words[y * self.stride..(y + 1) * self.stride]
+    }
+
+    /// Number of set bits.
+    pub fn count(&self) -> usize {
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// Sets every bit.
+    pub fn fill(&mut self) {
+        self.words.fill(u64::MAX);
+        self.clear_tails();
+    }
+
+    /// Sets the bits of a rectangle given by its first and past-the-end columns and rows.
+    pub fn set_rectangle(&mut self, x: (usize, usize), y: (usize, usize)) {
+        for y in y.0..y.1.min(self.size.height) {
+            let width = self.size.width;
+            let row = self.row_mut(y);
+            for x in x.0..x.1.min(width) {
+                row[x / WORD] |= 1 << (x % WORD);
+            }
+        }
+    }
+
+    /// The pixels of `map` that are at least `threshold` (NaN is not).
+    pub fn set_from(&mut self, map: &Image<f32>, threshold: f32) {
+        self.reset(map.size());
+        if self.size.is_empty() {
+            return;
+        }
+        let rows = map.pixels().par_chunks_exact(self.size.width);
+        self.words.par_chunks_exact_mut(self.stride).zip(rows).with_min_len(32).for_each(
+            |(words, row)| {
+                for (word, values) in words.iter_mut().zip(row.chunks(WORD)) {
+                    let mut bytes = [0_u8; WORD];
+                    for (byte, &value) in bytes.iter_mut().zip(values) {
+                        *byte = u8::from(value >= threshold);
+                    }
+                    *word = pack(&bytes);
+                }
+            },
+        );
+    }
+
+    /// Writes 255 for set bits and 0 for others.
+    pub fn write(&self, out: &mut Image<u8>) {
+        out.resize(self.size);
+        if self.size.is_empty() {
+            return;
+        }
+        let rows = self.words.par_chunks_exact(self.stride);
+        out.pixels_mut().par_chunks_exact_mut(self.size.width).zip(rows).with_min_len(64).for_each(
+            |(row, words)| {
+                for (values, word) in row.chunks_mut(WORD).zip(words) {
+                    for (values, byte) in values.chunks_mut(8).zip(word.to_le_bytes()) {
+                        let spread = SPREAD[usize::from(byte)].to_le_bytes();
+                        values.copy_from_slice(&spread[..values.len()]);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Sets every pixel that has a set pixel within `radius` rows and columns.
+    pub fn dilate(&mut self, radius: usize) {
+        if self.words.is_empty() {
+            return;
+        }
+        for row in self.words.chunks_exact_mut(self.stride) {
+            for step in steps(radius) {
+                towards_higher(row, step);
+            }
+            for step in steps(radius) {
+                towards_lower(row, step);
+            }
+        }
+        let (stride, length) = (self.stride, self.words.len());
+        for step in steps(radius) {
+            // Downwards: rows from the last on, so that sources are still unchanged.
+            for i in (step * stride..length).rev() {
+                self.words[i] |= self.words[i - step * stride];
+            }
+        }
+        for step in steps(radius) {
+            for i in step * stride..length {
+                self.words[i - step * stride] |= self.words[i];
+            }
+        }
+        self.clear_tails();
+    }
+
+    /// Clears every pixel that has a cleared pixel of the image within `radius`
+    /// rows and columns.
+    pub fn erode(&mut self, radius: usize) {
+        self.invert();
+        self.dilate(radius);
+        self.invert();
+    }
+
+    /// Erosion, then dilation: removes what is thinner than `2 radius + 1` pixels.
+    pub fn open(&mut self, radius: usize) {
+        self.erode(radius);
+        self.dilate(radius);
+    }
+
+    /// Dilation, then erosion: fills gaps of up to `2 radius` pixels.
+    pub fn close(&mut self, radius: usize) {
+        self.dilate(radius);
+        self.erode(radius);
+    }
+
+    fn invert(&mut self) {
+        for word in &mut self.words {
+            *word = !*word;
+        }
+        self.clear_tails();
+    }
+
+    fn clear_tails(&mut self) {
+        let used = self.size.width % WORD;
+        if used != 0 {
+            for row in self.words.chunks_exact_mut(self.stride) {
+                row[self.stride - 1] &= (1 << used) - 1;
+            }
+        }
+    }
+}
+
+/// Shifts that together spread a bit over every distance up to `radius`: each
+/// may be one more than the distance already covered.
+fn steps(radius: usize) -> impl Iterator<Item = usize> {
+    let mut covered = 0;
+    std::iter::from_fn(move || {
+        let step = (covered + 1).min(radius - covered).min(WORD - 1);
+        covered += step;
+        (step > 0).then_some(step)
+    })
+}
+
+fn towards_higher(row: &mut [u64], step: usize) {
+    for i in (1..row.len()).rev() {
+        row[i] |= row[i] << step | row[i - 1] >> (WORD - step);
+    }
+    row[0] |= row[0] << step;
+}
+
+fn towards_lower(row: &mut [u64], step: usize) {
+    let last = row.len() - 1;
+    for i in 0..last {
+        row[i] |= row[i] >> step | row[i + 1] << (WORD - step);
+    }
+    row[last] |= row[last] >> step;
+}
+
+/// 64 bytes of 0 or 1 as the bits of a word.
+fn pack(bytes: &[u8; WORD]) -> u64 {
+    let (eights, _) = bytes.as_chunks::<8>();
+    eights.iter().rev().fold(0, |word, eight| {
+        // The product moves the bit of byte i to bit 56 + i, and no two of its
+        // partial products meet.
+        let bits = u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+        word << 8 | bits
+    })
+}
+
+/// For each byte eight pixels: 255 where its bit is set.
+const SPREAD: [u64; 256] = {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let mut bit = 0;
+        while bit < 8 {
+            if byte >> bit & 1 == 1 {
+                table[byte] |= 0xff << (8 * bit);
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    table
+};
