@@ -2,10 +2,16 @@
 
 pub mod args;
 pub mod cdr;
+pub mod environment;
+pub mod log;
 pub mod message;
 pub mod names;
+pub mod node;
 pub mod params;
+pub mod qos;
 pub mod schema;
+pub mod services;
+pub mod time;
 pub mod yaml;
 
 /// Name of the node before remapping.

@@ -1,6 +1,7 @@
 //! Parameters in the forms that ROS 2 knows: YAML files, and (in `value`) the
 //! values and descriptors of the parameter services.
 
+mod store;
 mod value;
 
 use std::fmt::Write as _;
@@ -9,6 +10,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use thiserror::Error;
 
+pub use store::ParameterStore;
 pub use value::{descriptor, from_ros, list, to_ros};
 
 use crate::config::{Config, FIELDS, Field, Range};
