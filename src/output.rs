@@ -1,5 +1,6 @@
 //! Doors out: where perceptions go.
 
+pub mod bag;
 pub mod picture;
 pub mod score;
 

@@ -2,6 +2,8 @@
 //! in `tests/it/`.
 
 mod it {
+    #[cfg(feature = "tool")]
+    mod bag;
     mod depth;
     #[cfg(feature = "tool")]
     mod metric;
