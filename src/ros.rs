@@ -2,6 +2,7 @@
 
 pub mod args;
 pub mod cdr;
+pub mod convert;
 pub mod environment;
 pub mod log;
 pub mod message;
