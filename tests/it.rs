@@ -11,7 +11,10 @@ mod it {
     mod params;
     #[cfg(feature = "tool")]
     mod picture;
+    mod preprocess;
+    mod reference;
     mod regions;
+    mod roi;
     mod sync;
     mod track;
     #[cfg(feature = "tool")]
