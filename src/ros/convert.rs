@@ -174,7 +174,7 @@ pub fn split_side_by_side_into(
     right: &mut Picture,
 ) -> Result<(), ConvertError> {
     let size = both.size();
-    if size.width % 2 != 0 {
+    if !size.width.is_multiple_of(2) {
         return Err(ConvertError::SideBySide { size });
     }
     let half = Size::new(size.width / 2, size.height);

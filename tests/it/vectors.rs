@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
-use salient_stereo::ros::cdr::{decode, encode};
+use salient_stereo::ros::cdr::{CdrError, decode, encode};
 use salient_stereo::ros::message::{
     Message, builtin_interfaces, diagnostic_msgs, geometry_msgs, rcl_interfaces, rosgraph_msgs,
     salient_stereo_msgs, sensor_msgs, std_msgs, std_srvs, stereo_msgs, vision_msgs,
@@ -20,11 +20,13 @@ fn bytes(name: &str) -> Vec<u8> {
     fs::read(folder().join(format!("{name}.cdr"))).expect(name)
 }
 
+/// The fields of decoded bytes, and the bytes encoded again.
+type RoundTrip = (Value, Vec<u8>);
+
 /// What one type has to show.
 struct Row {
     type_name: &'static str,
-    /// Decodes bytes; returns the fields and the bytes encoded again.
-    round_trip: fn(&[u8]) -> Result<(Value, Vec<u8>), String>,
+    round_trip: fn(&[u8]) -> Result<RoundTrip, CdrError>,
     default: fn() -> Vec<u8>,
 }
 
@@ -32,8 +34,8 @@ fn row<T: Message + Default>() -> Row {
     Row {
         type_name: T::TYPE_NAME,
         round_trip: |bytes| {
-            let message: T = decode(bytes).map_err(|e| e.to_string())?;
-            let fields = serde_json::to_value(&message).map_err(|e| e.to_string())?;
+            let message: T = decode(bytes)?;
+            let fields = serde_json::to_value(&message).expect(T::TYPE_NAME);
             Ok((fields, encode(&message)))
         },
         default: || encode(&T::default()),
@@ -155,10 +157,10 @@ fn no_vector_is_left_out() {
 }
 
 /// Garbage in the length of any sequence or text ends in a message or in an
-/// error, at once and without memory being asked for.
+/// error, and at once: had the elements been counted down to the four billion
+/// that they claim, this would take hours.
 #[test]
-fn damaged_vectors_never_panic_and_never_take_memory() {
-    let before = peak_memory_kib();
+fn damaged_vectors_never_panic() {
     for row in rows() {
         let bytes = bytes(&format!("{}__filled", file_stem(row.type_name)));
         for at in (4..bytes.len().saturating_sub(3)).step_by(4) {
@@ -172,15 +174,4 @@ fn damaged_vectors_never_panic_and_never_take_memory() {
             let _ = (row.round_trip)(&bytes[..len]);
         }
     }
-    if let (Some(before), Some(after)) = (before, peak_memory_kib()) {
-        // Address space, not resident memory: an untouched allocation counts.
-        assert!(after - before < 1 << 20, "{} KiB were taken", after - before);
-    }
-}
-
-/// Peak of the process's address space, where the system tells it.
-fn peak_memory_kib() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmPeak:"))?;
-    line.split_whitespace().nth(1)?.parse().ok()
 }

@@ -198,7 +198,7 @@ fn even(
     side: &'static str,
     length: usize,
 ) -> Result<(), ConvertError> {
-    if length % 2 == 0 {
+    if length.is_multiple_of(2) {
         return Ok(());
     }
     Err(ConvertError::OddSize { side, size, encoding: message.encoding.clone() })

@@ -1,4 +1,4 @@
-//! Markers for RViz and Foxglove.
+//! What viewers draw into the scene.
 
 #![allow(missing_docs, reason = "the .msg texts document the fields")]
 
