@@ -2,6 +2,7 @@
 
 pub mod bag;
 pub mod picture;
+pub mod report;
 pub mod score;
 
 use crate::input::{Observation, Tally};

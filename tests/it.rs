@@ -14,6 +14,8 @@ mod it {
     mod preprocess;
     mod reference;
     mod regions;
+    #[cfg(feature = "tool")]
+    mod report;
     mod roi;
     mod sync;
     mod track;

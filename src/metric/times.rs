@@ -58,6 +58,17 @@ impl StageStats {
         self.times.seen()
     }
 
+    /// The times that are kept: of every frame, or in a very long run of one
+    /// frame in [`StageStats::stride`].
+    pub fn samples(&self) -> &[StageTimes] {
+        self.times.items()
+    }
+
+    /// One frame in how many is kept.
+    pub const fn stride(&self) -> u64 {
+        self.times.stride()
+    }
+
     /// The percentiles so far; `None` before the first frame.
     pub fn summary(&self) -> Option<StageSummary> {
         let mut buffer = Vec::with_capacity(self.times.items().len());

@@ -1,0 +1,420 @@
+//! The page: the template with the run's figures in it.
+
+use std::io::{self, Write};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde_json::{Value, json};
+
+use super::layer::{BEYOND_COLOR, NEAR_COLOR, ValueLayer};
+use super::plot::{Plot, round_step};
+use super::text::{count, escape, hex, ms, or_dash, percent, script_safe, utc};
+use super::{Kept, ReportSink, scores, timing};
+use crate::config::{Config, SaliencyMode};
+use crate::output::picture::{BORDER, Colormap, INVALID, SALIENT, Scale, track_color};
+
+const PAGE: &str = include_str!("page.html");
+const VIEWER: &str = include_str!("viewer.html");
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("viewer.js");
+
+/// Writes the whole page.
+pub fn write(report: &ReportSink, out: &mut impl Write) -> io::Result<()> {
+    let scales = Scales::of(report.kept.items());
+    let mut rest = PAGE;
+    while let Some((before, name, after)) = next_slot(rest) {
+        out.write_all(before.as_bytes())?;
+        if name == "frames" {
+            write_frames(report, &scales, out)?;
+        } else {
+            out.write_all(fill(report, name).as_bytes())?;
+        }
+        rest = after;
+    }
+    out.write_all(rest.as_bytes())
+}
+
+/// The text before the next `{{name}}`, the name, and the text after it.
+fn next_slot(text: &str) -> Option<(&str, &str, &str)> {
+    let (before, rest) = text.split_once("{{")?;
+    let (name, after) = rest.split_once("}}")?;
+    Some((before, name, after))
+}
+
+fn fill(report: &ReportSink, name: &str) -> String {
+    match name {
+        "version" => env!("CARGO_PKG_VERSION").to_owned(),
+        "title" => escape(title(&report.facts.source)),
+        "command" => escape(&report.facts.command),
+        "style" => STYLE.to_owned(),
+        "script" => SCRIPT.to_owned(),
+        "facts" => facts(report),
+        "notice" => notice(report),
+        "kpis" => kpis(report),
+        "viewer" if report.totals.frames > 0 => VIEWER.to_owned(),
+        "truth" => scores::html(report),
+        "tracks" => tracks(report),
+        "times" => timing::html(&report.stats),
+        "counters" => counters(report),
+        "settings" => settings(&report.facts.config),
+        "sampling" => sampling(report),
+        _ => String::new(),
+    }
+}
+
+/// The last part of a path.
+fn title(source: &str) -> &str {
+    let trimmed = source.trim_end_matches(['/', '\\']);
+    trimmed.rsplit(['/', '\\']).find(|part| !part.is_empty()).unwrap_or("run")
+}
+
+fn facts(report: &ReportSink) -> String {
+    let totals = &report.totals;
+    let mut facts = Vec::new();
+    if let Some(size) = totals.size {
+        facts.push(format!("{} × {} px", size.width, size.height));
+    }
+    facts.push(count(totals.frames, "frame"));
+    let seconds = totals.last.seconds_since(totals.first);
+    if seconds > 0.0 && totals.frames > 1 {
+        facts.push(format!("{seconds:.1} s"));
+        facts.push(format!("{:.1} Hz", (totals.frames - 1) as f64 / seconds));
+    }
+    if totals.frames > 0 {
+        facts.extend(utc(totals.first));
+        facts.push(format!("frame id {}", escape(&totals.frame_id)));
+    }
+    let mode = match report.facts.config.saliency.mode {
+        SaliencyMode::Scene => "scene",
+        SaliencyMode::Paper => "paper",
+        SaliencyMode::FrequencyTuned => "frequency-tuned",
+        SaliencyMode::SpectralResidual => "spectral residual",
+        SaliencyMode::FullFrame => "full frame",
+    };
+    facts.push(format!("saliency mode {mode}"));
+    let source = escape(&report.facts.source);
+    if source != escape(title(&report.facts.source)) {
+        facts.push(format!("<code>{source}</code>"));
+    }
+    facts.join(" · ")
+}
+
+fn notice(report: &ReportSink) -> String {
+    if report.totals.frames == 0 {
+        return "<p class=\"notice\">No stereo pair reached the pipeline in this run. The counters below say what was met instead.</p>".to_owned();
+    }
+    match &report.tally {
+        Some(tally) if tally.has_losses() => {
+            let unpaired = tally.unpaired_left + tally.unpaired_right;
+            let skipped: u64 = tally.skipped.values().sum();
+            let parts: Vec<String> = [(unpaired, "unpaired image"), (skipped, "skipped input")]
+                .into_iter()
+                .filter(|(number, _)| *number > 0)
+                .map(|(number, noun)| count(number, noun))
+                .collect();
+            format!(
+                "<p class=\"notice\">Not everything was used: {}. See <a href=\"#counters\">the counters</a>.</p>",
+                parts.join(" and ")
+            )
+        }
+        _ => String::new(),
+    }
+}
+
+fn kpi(value: &str, unit: &str, what: &str) -> String {
+    format!("<div class=\"kpi\"><b>{value} <small>{unit}</small></b><span>{what}</span></div>")
+}
+
+fn kpis(report: &ReportSink) -> String {
+    let totals = &report.totals;
+    let frames = totals.frames as f64;
+    let mut out = String::new();
+    if totals.frames == 0 {
+        return out;
+    }
+    if let Some(times) = report.stats.summary().filter(|times| times.total_ms.p50 > 0.0) {
+        out += &kpi(
+            &ms(times.total_ms.p50),
+            "ms",
+            &format!("median per frame · {:.0} Hz", 1000.0 / times.total_ms.p50),
+        );
+    }
+    out += &kpi(&format!("{:.1}", totals.regions as f64 / frames), "", "regions per frame");
+    out += &kpi(&percent(totals.roi_fraction / frames), "", "of the image is matched");
+    if let Some(summary) = report.scores.summary() {
+        if let Some(row) = summary.main_regions() {
+            let [p, r] = [row.precision, row.recall].map(|v| or_dash(v, |v| format!("{v:.2}")));
+            out += &kpi(
+                &format!("{:.2}", row.f1),
+                "F1",
+                &format!("regions at IoU ≥ 0.5 · P {p} R {r}"),
+            );
+        }
+        if let Some(row) = &summary.disparity_in_roi {
+            out += &kpi(
+                &format!("{:.2}", row.epe_px),
+                "px",
+                &format!("end-point error · D1 {}", percent(row.d1)),
+            );
+        }
+        if let Some(row) = &summary.distance {
+            out += &kpi(
+                &percent(row.mean_relative_error),
+                "",
+                &format!("mean distance error · {:.2} m", row.mean_error_m),
+            );
+        }
+    }
+    out
+}
+
+/// The tracks that are labelled in the plot of distances.
+const LABELLED_TRACKS: usize = 14;
+
+fn tracks(report: &ReportSink) -> String {
+    let mut lines: std::collections::BTreeMap<u32, Vec<(f64, f64)>> = Default::default();
+    for row in report.rows.items() {
+        for (id, distance) in row.distances.iter().filter(|(id, _)| *id != 0) {
+            lines.entry(*id).or_default().push((row.index as f64, f64::from(*distance)));
+        }
+    }
+    if lines.is_empty() || report.totals.frames < 2 {
+        return String::new();
+    }
+    let farthest = lines.values().flatten().map(|point| point.1).fold(0.0, f64::max);
+    let mut plot = Plot::new(report.totals.frames, farthest, " m").with_class("tracks");
+    let gap = report.rows.stride() as f64 * 3.5;
+    for (id, points) in &lines {
+        plot.line(points, gap, &hex(track_color(*id)));
+    }
+    let mut longest: Vec<_> = lines.iter().filter(|(_, points)| points.len() > 2).collect();
+    longest.sort_by_key(|(id, points)| (std::cmp::Reverse(points.len()), **id));
+    for (id, points) in longest.into_iter().take(LABELLED_TRACKS) {
+        if let Some((x, y)) = points.last() {
+            plot.label(*x, *y, &format!("#{id}"), &hex(track_color(*id)));
+        }
+    }
+    format!(
+        "<section><h2>Distance over time</h2><p class=\"sub\">Median depth of every tracked region, by frame; {}. Click to go there.</p>{}</section>",
+        count(lines.len() as u64, "track"),
+        plot.html()
+    )
+}
+
+fn counters(report: &ReportSink) -> String {
+    let row = |name: &str, number: u64| {
+        format!("<tr><td class=\"wrap\">{}</td><td class=\"n\">{number}</td></tr>", escape(name))
+    };
+    let mut input = row("frames processed", report.totals.frames);
+    if let Some(tally) = &report.tally {
+        input += &row("pairs", tally.pairs);
+        input += &row("left images without a partner", tally.unpaired_left);
+        input += &row("right images without a partner", tally.unpaired_right);
+        for (reason, number) in &tally.skipped {
+            input += &row(&format!("skipped: {reason}"), *number);
+        }
+    }
+    for (name, number) in &report.counters {
+        input += &row(name, *number);
+    }
+    let reasons = [
+        "smaller than regions.min_area",
+        "low confidence or too few matches",
+        "inconsistent depth",
+        "seen in too few frames",
+        "beyond regions.max_count",
+    ];
+    let mut output = row("regions published", report.totals.regions);
+    for (reason, number) in reasons.iter().zip(report.totals.rejections) {
+        output += &row(&format!("refused: {reason}"), number);
+    }
+    format!(
+        "<section id=\"counters\"><h2>Counters</h2><p class=\"sub\">Nothing is lost without being counted.</p><div class=\"split\"><table><caption>Input</caption><tbody>{input}</tbody></table><table><caption>Regions</caption><tbody>{output}</tbody></table></div></section>"
+    )
+}
+
+fn settings(config: &Config) -> String {
+    let defaults = Config::default().flatten();
+    let all = config.flatten();
+    let text = |value: &Value| {
+        escape(&value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned))
+    };
+    let mut rows = String::new();
+    let mut changed = 0;
+    for ((name, value), (_, default)) in all.iter().zip(&defaults) {
+        if value != default {
+            changed += 1;
+            rows += &format!(
+                "<tr><td><code>{name}</code></td><td class=\"n\"><code>{}</code></td><td class=\"n\"><code>{}</code></td></tr>",
+                text(value),
+                text(default)
+            );
+        }
+    }
+    if changed == 0 {
+        return format!(
+            "<section><h2>Parameters</h2><p class=\"sub\">All {} parameters have their defaults.</p></section>",
+            all.len()
+        );
+    }
+    format!(
+        "<section><h2>Parameters</h2><p class=\"sub\">Changed from their defaults: {changed} of {}.</p><div class=\"list\"><table><thead><tr><th>parameter</th><th class=\"n\">value</th><th class=\"n\">default</th></tr></thead><tbody>{rows}</tbody></table></div></section>",
+        all.len()
+    )
+}
+
+fn sampling(report: &ReportSink) -> String {
+    let (shown, seen) = (report.kept.items().len(), report.totals.frames);
+    match report.kept.stride() {
+        _ if seen == 0 => "No frame to show.".to_owned(),
+        1 => format!("All {} are shown.", count(seen, "frame")),
+        stride => format!(
+            "The viewer shows {shown} of {seen} frames: the first and every {stride}th after it. Tables and scores are over all frames."
+        ),
+    }
+}
+
+/// The colour scales of the whole run.
+struct Scales {
+    disparity: Scale,
+    depth: Scale,
+}
+
+impl Scales {
+    fn of(kept: &[Kept]) -> Self {
+        let range = |map: fn(&Kept) -> &ValueLayer| {
+            let scales = kept.iter().filter_map(move |frame| map(frame).scale);
+            scales.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), scale| {
+                (low.min(scale.low()), high.max(scale.high()))
+            })
+        };
+        let (disparity_low, disparity_high) = range(|frame| &frame.disparity);
+        let (depth_low, depth_high) = range(|frame| &frame.depth);
+        Self {
+            disparity: Scale::linear(disparity_low, disparity_high),
+            depth: Scale::logarithmic(depth_low, depth_high),
+        }
+    }
+}
+
+fn linear_ticks(scale: &Scale) -> Vec<Value> {
+    let (low, high) = (f64::from(scale.low()), f64::from(scale.high()));
+    let step = round_step(high - low, 5.0);
+    let decimals = (-step.log10().floor()).clamp(0.0, 6.0) as usize;
+    let first = (low / step - 1e-6).ceil() as i64;
+    (first..first + 8)
+        .map(|i| i as f64 * step)
+        .take_while(|v| *v <= high + step * 1e-6)
+        .map(|v| json!([scale.position(v as f32), format!("{v:.decimals$}")]))
+        .collect()
+}
+
+fn logarithmic_ticks(scale: &Scale) -> Vec<Value> {
+    let (low, high) = (f64::from(scale.low()), f64::from(scale.high()));
+    let decades = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
+    let wide = high / low > 30.0;
+    let factors: &[f64] = match high / low {
+        ratio if ratio > 300.0 => &[1.0],
+        _ if wide => &[1.0, 2.0, 5.0],
+        ratio if ratio > 4.0 => &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0],
+        _ => return linear_ticks(scale),
+    };
+    decades
+        .flat_map(|power| factors.iter().map(move |factor| factor * 10_f64.powi(power)))
+        .filter(|v| (low..=high).contains(v))
+        .map(|v| json!([scale.position(v as f32), format!("{v}")]))
+        .collect()
+}
+
+fn color_table(map: Colormap) -> String {
+    map.table().iter().map(|color| hex(*color)[1..].to_owned()).collect()
+}
+
+fn write_frames(report: &ReportSink, scales: &Scales, out: &mut impl Write) -> io::Result<()> {
+    let unit_ticks: Vec<Value> =
+        [0.0, 0.5, 1.0].iter().map(|v| json!([v, v.to_string()])).collect();
+    let with_unit = |mut ticks: Vec<Value>, unit: &str| {
+        if let Some(text) = ticks.last_mut().and_then(|tick| tick.get_mut(1)) {
+            *text = json!(format!("{} {unit}", text.as_str().unwrap_or_default()));
+        }
+        ticks
+    };
+    let describe = |scale: &Scale, colors: &str, unit: &str, log: bool, reversed: bool| {
+        let ticks = if log { logarithmic_ticks(scale) } else { linear_ticks(scale) };
+        json!({
+            "low": scale.low(), "high": scale.high(), "log": log, "colors": colors,
+            "reversed": reversed, "unit": unit, "ticks": with_unit(ticks, unit),
+        })
+    };
+    let shown: Vec<u64> = report.kept.items().iter().map(|frame| frame.index).collect();
+    let run = json!({
+        "frames": report.totals.frames,
+        "shown": shown,
+        "pace": pace(report),
+        "scales": {
+            "saliency": {
+                "low": 0, "high": 1, "log": false, "colors": "inferno", "reversed": false,
+                "unit": "", "ticks": unit_ticks,
+            },
+            "disparity": describe(&scales.disparity, "turbo", "px", false, false),
+            "depth": describe(&scales.depth, "viridis", "m", true, true),
+        },
+        "colors": {
+            "turbo": color_table(Colormap::Turbo),
+            "viridis": color_table(Colormap::Viridis),
+            "inferno": color_table(Colormap::Inferno),
+        },
+        "invalid": hex(INVALID),
+        "beyond": hex(BEYOND_COLOR),
+        "near": hex(NEAR_COLOR),
+        "salient": hex(SALIENT),
+        "border": hex(BORDER),
+    });
+    writeln!(
+        out,
+        "<script type=\"application/json\" id=\"run\">{}</script>",
+        script_safe(&run.to_string())
+    )?;
+    for frame in report.kept.items() {
+        write_frame(frame, scales, out)?;
+    }
+    Ok(())
+}
+
+fn write_frame(frame: &Kept, scales: &Scales, out: &mut impl Write) -> io::Result<()> {
+    let png = |bytes: &[u8]| format!("data:image/png;base64,{}", BASE64.encode(bytes));
+    let painted = |map: &ValueLayer, scale: &Scale, colors: Colormap, reversed: bool| {
+        let mut map = map.clone();
+        map.paint(scale, colors, reversed);
+        png(map.layer.bytes())
+    };
+    let data = json!({
+        "index": frame.index,
+        "time": frame.time,
+        "width": frame.size.width,
+        "height": frame.size.height,
+        "left": format!("data:image/jpeg;base64,{}", BASE64.encode(&frame.left)),
+        "layers": {
+            "saliency": png(frame.saliency.bytes()),
+            "roi": png(frame.roi.bytes()),
+            "disparity": painted(&frame.disparity, &scales.disparity, Colormap::Turbo, false),
+            "depth": painted(&frame.depth, &scales.depth, Colormap::Viridis, true),
+        },
+        "regions": frame.regions,
+        "rejected": frame.rejected,
+    });
+    writeln!(
+        out,
+        "<script type=\"application/json\" class=\"frame\">{}</script>",
+        script_safe(&data.to_string())
+    )
+}
+
+/// Milliseconds per shown frame while playing: real time where that can be seen.
+fn pace(report: &ReportSink) -> f64 {
+    let totals = &report.totals;
+    let seconds = totals.last.seconds_since(totals.first);
+    let per_frame = 1000.0 * seconds / totals.frames.saturating_sub(1).max(1) as f64;
+    let pace = per_frame * report.kept.stride() as f64;
+    if pace.is_finite() && pace > 0.0 { pace.clamp(100.0, 700.0).round() } else { 300.0 }
+}
