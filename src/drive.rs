@@ -142,6 +142,18 @@ impl Engine {
         &running.perception
     }
 
+    /// Takes the result of the last frame out, so that it can be published
+    /// while the next one is made; `spare` lends its buffers to the next frame.
+    /// `None` when no frame was processed since the engine was built anew.
+    pub fn exchange(&mut self, spare: Option<Perception>) -> Option<Perception> {
+        let running = self.running.as_mut()?;
+        let size = running.pipeline.output_size();
+        let next = spare
+            .filter(|spare| spare.left.gray.size() == size)
+            .unwrap_or_else(|| Perception::new(size, Arc::clone(&running.perception.rig)));
+        Some(std::mem::replace(&mut running.perception, next))
+    }
+
     fn start(&self, size: Size, frame: &StereoFrame) -> Running {
         let mut pipeline = Pipeline::new(&self.config, size, self.level).with_clock(self.clock);
         if let Some(fraction) = self.centred_roi {

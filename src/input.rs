@@ -1,5 +1,7 @@
 //! Doors in: where stereo frames come from.
 
+pub mod live;
+
 use std::collections::BTreeMap;
 
 use crate::image::Image;

@@ -22,6 +22,8 @@
 //! ROS, file, socket or clock.
 
 pub mod camera;
+#[cfg(feature = "tool")]
+pub mod command;
 pub mod config;
 #[cfg(feature = "tool")]
 pub mod drive;
@@ -29,6 +31,8 @@ pub mod error;
 pub mod image;
 #[cfg(feature = "tool")]
 pub mod input;
+#[cfg(feature = "tool")]
+pub mod mailbox;
 #[cfg(feature = "tool")]
 pub mod metric;
 #[cfg(feature = "tool")]

@@ -1,15 +1,19 @@
 //! Everything that only ROS 2 knows: messages, conversions, parameters, the node.
 
 pub mod args;
+pub mod calibration;
 pub mod cdr;
 pub mod convert;
+pub mod diagnostics;
 pub mod environment;
 pub mod log;
 pub mod message;
 pub mod names;
 pub mod node;
 pub mod params;
+pub mod play;
 pub mod qos;
+pub mod runtime;
 pub mod schema;
 pub mod services;
 pub mod time;

@@ -1,0 +1,3 @@
+//! The commands: pairings of a source and sinks.
+
+pub mod node;
