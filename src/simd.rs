@@ -5,9 +5,85 @@
 //! [`fearless_simd::dispatch`] stand inside rayon closures, never around them:
 //! around them the closures would be compiled without the wide instructions.
 
-pub use fearless_simd::{Level, dispatch};
+pub use fearless_simd::prelude;
+pub use fearless_simd::{Level, Simd, dispatch, u8x32};
+
+use fearless_simd::prelude::*;
+
+/// Bytes in the vectors of the byte kernels: one AVX2 register, whatever the
+/// level, so that every level computes the same blocks.
+pub const LANES: usize = 32;
+
+/// One vector's worth of bytes in memory.
+pub type Block = [u8; LANES];
 
 /// The best instruction set of this processor.
 pub fn detect() -> Level {
     Level::new()
+}
+
+/// Every instruction set that this processor can run, the plainest first: for
+/// tests that compare them.
+pub fn available() -> Vec<Level> {
+    let best = Level::new();
+    let mut levels = Vec::new();
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        levels.extend(best.as_sse2().map(Level::Sse2));
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_avx512().map(Level::Avx512));
+    }
+    if levels.is_empty() {
+        levels.push(best);
+    }
+    levels
+}
+
+/// The 32 bytes from `at`.
+#[inline(always)]
+pub(crate) fn load<S: Simd>(simd: S, bytes: &[u8], at: usize) -> u8x32<S> {
+    u8x32::from_slice(simd, &bytes[at..at + LANES])
+}
+
+/// Writes 32 bytes from `at`.
+#[inline(always)]
+pub(crate) fn store<S: Simd>(bytes: &mut [u8], at: usize, value: u8x32<S>) {
+    value.store_slice(&mut bytes[at..at + LANES]);
+}
+
+/// The bytes of a block.
+#[inline(always)]
+pub(crate) fn load_block<S: Simd>(simd: S, block: &Block) -> u8x32<S> {
+    u8x32::load_array_ref(simd, block)
+}
+
+/// |a - b| per lane.
+#[inline(always)]
+pub(crate) fn abs_diff<S: Simd>(a: u8x32<S>, b: u8x32<S>) -> u8x32<S> {
+    a.saturating_sub(b) | b.saturating_sub(a)
+}
+
+/// Transposes 32 blocks: lane `j` of `blocks[i]` changes places with lane `i`
+/// of `blocks[j]`.
+///
+/// Five rounds of interleaving the upper with the lower half are a perfect
+/// shuffle of all 1024 bytes by five bits of their index, which swaps row and
+/// column.
+#[inline(always)]
+pub(crate) fn transpose<S: Simd>(simd: S, blocks: &[Block; LANES]) -> [u8x32<S>; LANES] {
+    let mut rows = [u8x32::splat(simd, 0); LANES];
+    for (row, block) in rows.iter_mut().zip(blocks) {
+        *row = load_block(simd, block);
+    }
+    for _ in 0..5 {
+        let mut next = rows;
+        for i in 0..LANES / 2 {
+            let (low, high) = rows[i].interleave(rows[i + LANES / 2]);
+            next[2 * i] = low;
+            next[2 * i + 1] = high;
+        }
+        rows = next;
+    }
+    rows
 }

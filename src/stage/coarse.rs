@@ -2,8 +2,13 @@
 
 use crate::config::Config;
 use crate::image::{Image, Size};
-use crate::perception::View;
+use crate::perception::{DISPARITY_STEP, View};
 use crate::simd::Level;
+use crate::stage::stereo::cost::Penalties;
+use crate::stage::stereo::engine::{Engine, Settings, Views};
+use crate::stage::stereo::plan::Plan;
+use crate::stage::stereo::winner::STEPS;
+use crate::stage::stereo::{Matches, NO_MATCH};
 
 /// Cells per pixel along each axis: cell `(x, y)` covers the 4x4 pixels from `(4x, 4y)`.
 pub const CELL: usize = 4;
@@ -22,19 +27,147 @@ pub struct CoarseDisparity {
 /// The quarter-size matcher.
 pub struct Coarse {
     size: Size,
+    engine: Engine,
+    plan: Plan,
+    left: Image<u8>,
+    right: Image<u8>,
+    matches: Matches,
 }
 
 impl Coarse {
     /// The matcher for views of `size`.
-    pub fn new(_config: &Config, size: Size, _level: Level) -> Self {
-        Self { size: size.divided_by(CELL) }
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
+        let stereo = &config.stereo;
+        let lo = stereo.min_disparity.max(0) as usize;
+        let hi = lo + stereo.disparity_range.max(1) as usize;
+        let settings = Settings {
+            penalties: Penalties {
+                p1: stereo.p1.clamp(0, 255) as u8,
+                p2: stereo.p2.clamp(stereo.p1, 255) as u8,
+            },
+            diagonals: false,
+            context: 8,
+            uniqueness_ratio: 0,
+            search: lo / CELL..hi.div_ceil(CELL) + 1,
+        };
+        Self {
+            size: size.divided_by(CELL),
+            engine: Engine::new(settings, level),
+            plan: Plan::default(),
+            left: Image::default(),
+            right: Image::default(),
+            matches: Matches::default(),
+        }
     }
 
     /// Matches two views of the size given to `new`.
-    pub fn run(&mut self, _left: &View, _right: &View, out: &mut CoarseDisparity) {
-        out.checked.resize(self.size);
-        out.checked.fill(f32::NAN);
-        out.filled.resize(self.size);
-        out.filled.fill(0.0);
+    pub fn run(&mut self, left: &View, right: &View, out: &mut CoarseDisparity) {
+        shrink(&left.gray, &mut self.left);
+        shrink(&right.gray, &mut self.right);
+        let search = self.engine.settings().search.clone();
+        self.plan.whole(self.size, &search);
+        let views =
+            Views { left: &self.left, right: &self.right, mask: None, coarse: None, weight: None };
+        self.engine.run(&views, &self.plan, &mut self.matches);
+        check(&self.matches, &mut out.checked);
+        fill(&out.checked, &mut out.filled);
     }
+}
+
+/// Mean of each cell; cells that reach beyond the image repeat its border.
+pub fn shrink(image: &Image<u8>, out: &mut Image<u8>) {
+    let size = image.size();
+    out.resize(size.divided_by(CELL));
+    let whole = size.width / CELL;
+    for y in 0..out.height() {
+        let rows: [&[u8]; CELL] =
+            std::array::from_fn(|i| image.row((CELL * y + i).min(size.height - 1)));
+        let (cells, rest) = out.row_mut(y).split_at_mut(whole);
+        let quads = rows.map(|row| row.as_chunks::<CELL>().0);
+        for (x, cell) in cells.iter_mut().enumerate() {
+            let sum: u16 = quads.iter().flat_map(|row| row[x]).map(u16::from).sum();
+            *cell = ((sum + 8) >> 4) as u8;
+        }
+        for (i, cell) in rest.iter_mut().enumerate() {
+            let sum: u16 = rows
+                .iter()
+                .flat_map(|row| {
+                    (0..CELL).map(move |k| row[(CELL * (whole + i) + k).min(size.width - 1)])
+                })
+                .map(u16::from)
+                .sum();
+            *cell = ((sum + 8) >> 4) as u8;
+        }
+    }
+}
+
+/// Keeps disparities that both views agree on to within one cell.
+fn check(matches: &Matches, out: &mut Image<f32>) {
+    let size = matches.left.size();
+    out.resize(size);
+    let pixels_per_step = CELL as f32 * DISPARITY_STEP;
+    for y in 0..size.height {
+        let right = matches.right.row(y);
+        for (x, (out, &d)) in out.row_mut(y).iter_mut().zip(matches.left.row(y)).enumerate() {
+            let partner = x as i32 - (i32::from(d) + STEPS / 2).div_euclid(STEPS);
+            let agreed = d != NO_MATCH
+                && usize::try_from(partner)
+                    .ok()
+                    .and_then(|x| right.get(x))
+                    .is_some_and(|&r| (i32::from(d) - i32::from(r)).abs() <= STEPS);
+            *out = if agreed { f32::from(d) * pixels_per_step } else { f32::NAN };
+        }
+    }
+}
+
+/// Fills holes along the rows with the smaller disparity of the two
+/// neighbours: what is hidden from one view lies behind. Rows without any
+/// disparity take those of the nearest row above, else below.
+fn fill(checked: &Image<f32>, out: &mut Image<f32>) {
+    out.copy_from(checked);
+    let height = out.height();
+    let mut known = None;
+    for y in 0..height {
+        if !fill_row(out.row_mut(y)) {
+            continue;
+        }
+        match known {
+            None => (0..y).for_each(|above| copy_row(out, y, above)),
+            Some(last) => (last + 1..y).for_each(|between| copy_row(out, last, between)),
+        }
+        known = Some(y);
+    }
+    match known {
+        None => out.fill(0.0),
+        Some(last) => (last + 1..height).for_each(|below| copy_row(out, last, below)),
+    }
+}
+
+fn copy_row(image: &mut Image<f32>, from: usize, to: usize) {
+    let width = image.width();
+    image.pixels_mut().copy_within(from * width..(from + 1) * width, to * width);
+}
+
+/// False when there is nothing to fill from.
+fn fill_row(row: &mut [f32]) -> bool {
+    let mut x = 0;
+    let mut left = None;
+    while x < row.len() {
+        if !row[x].is_nan() {
+            left = Some(row[x]);
+            x += 1;
+            continue;
+        }
+        let end = row[x..].iter().position(|d| !d.is_nan()).map(|i| x + i);
+        let right = end.map(|end| row[end]);
+        let value = match (left, right) {
+            (Some(a), Some(b)) => a.min(b),
+            (Some(a), None) | (None, Some(a)) => a,
+            (None, None) => return false,
+        };
+        let end = end.unwrap_or(row.len());
+        row[x..end].fill(value);
+        x = end;
+    }
+    left.is_some()
 }

@@ -1,10 +1,22 @@
 //! Stereo correspondence inside the region of interest.
 
+pub mod census;
+pub mod cost;
+pub mod engine;
+pub mod horizontal;
+pub mod plan;
+pub mod vertical;
+pub mod volume;
+pub mod winner;
+
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{RoiMask, View};
 use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
+use crate::stage::stereo::cost::Penalties;
+use crate::stage::stereo::engine::{Engine, Settings, Views};
+use crate::stage::stereo::plan::Plan;
 
 /// Value of a pixel without a match.
 pub const NO_MATCH: i16 = i16::MIN;
@@ -25,29 +37,63 @@ pub struct Matches {
 /// The matcher.
 pub struct Stereo {
     size: Size,
+    engine: Engine,
+    plan: Plan,
+    lambda: f32,
+    weight: Image<u8>,
 }
 
 impl Stereo {
     /// The matcher for views of `size`.
-    pub fn new(_config: &Config, size: Size, _level: Level) -> Self {
-        Self { size }
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
+        let stereo = &config.stereo;
+        let lo = stereo.min_disparity.max(0) as usize;
+        let settings = Settings {
+            penalties: Penalties {
+                p1: stereo.p1.clamp(0, 255) as u8,
+                p2: stereo.p2.clamp(stereo.p1, 255) as u8,
+            },
+            diagonals: true,
+            context: 8,
+            uniqueness_ratio: stereo.uniqueness_ratio.max(0) as u32,
+            search: lo..lo + stereo.disparity_range.max(1) as usize,
+        };
+        Self {
+            size,
+            engine: Engine::new(settings, level),
+            plan: Plan::default(),
+            lambda: stereo.saliency_weight as f32,
+            weight: Image::default(),
+        }
     }
 
     /// Matches `left` with `right` where `roi.matched` is set.
     pub fn run(
         &mut self,
-        _left: &View,
-        _right: &View,
-        _roi: &RoiMask,
-        _saliency: &Image<f32>,
-        _coarse: &CoarseDisparity,
+        left: &View,
+        right: &View,
+        roi: &RoiMask,
+        saliency: &Image<f32>,
+        coarse: &CoarseDisparity,
         out: &mut Matches,
     ) {
-        out.left.resize(self.size);
-        out.left.fill(NO_MATCH);
-        out.right.resize(self.size);
-        out.right.fill(NO_MATCH);
-        out.evidence.resize(self.size);
-        out.evidence.fill(0);
+        debug_assert_eq!(left.gray.size(), self.size);
+        let search = self.engine.settings().search.clone();
+        self.plan.of_mask(&roi.matched, roi.fraction, Some(&coarse.checked), &search);
+        let weighted = self.lambda > 0.0;
+        if weighted {
+            self.weight.resize(self.size);
+            for (out, &s) in self.weight.pixels_mut().iter_mut().zip(saliency.pixels()) {
+                *out = (255.0 / (1.0 + self.lambda * s.clamp(0.0, 1.0))) as u8;
+            }
+        }
+        let views = Views {
+            left: &left.gray,
+            right: &right.gray,
+            mask: Some(&roi.matched),
+            coarse: Some(&coarse.checked),
+            weight: weighted.then_some(&self.weight),
+        };
+        self.engine.run(&views, &self.plan, out);
     }
 }

@@ -1,0 +1,80 @@
+//! The matching cost: how many bits of two census descriptors differ.
+
+use crate::simd::prelude::*;
+use crate::simd::{LANES, Simd, load, u8x32};
+use crate::stage::stereo::census::PLANES;
+
+/// Largest cost of one pixel: all 31 pairs differ.
+pub const MAX_COST: u8 = 31;
+
+/// One byte of 32 descriptors per plane.
+pub type Descriptors<S> = [u8x32<S>; PLANES];
+
+/// The descriptors from index `at` of rows of byte planes `stride` apart.
+#[inline(always)]
+pub fn descriptors<S: Simd>(simd: S, planes: &[u8], stride: usize, at: usize) -> Descriptors<S> {
+    [
+        load(simd, planes, at),
+        load(simd, planes, at + stride),
+        load(simd, planes, at + 2 * stride),
+        load(simd, planes, at + 3 * stride),
+    ]
+}
+
+/// Hamming distance of 32 pairs of descriptors.
+#[inline(always)]
+pub fn hamming<S: Simd>(a: &Descriptors<S>, b: &Descriptors<S>) -> u8x32<S> {
+    let ones = |k: usize| (a[k] ^ b[k]).count_ones();
+    (ones(0) + ones(1)) + (ones(2) + ones(3))
+}
+
+/// Penalties of a disparity step between two pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Penalties {
+    /// For a step of one pixel.
+    pub p1: u8,
+    /// For a larger step between pixels of equal brightness.
+    pub p2: u8,
+}
+
+impl Penalties {
+    /// P2 is never less than this, however strong the edge: half way from P1 to P2.
+    pub const fn least_p2(self) -> u8 {
+        self.p1 + (self.p2 - self.p1) / 4
+    }
+}
+
+/// P1 and P2 of 32 pixels.
+#[derive(Clone, Copy)]
+pub struct PenaltyLanes<S: Simd> {
+    /// P1.
+    pub p1: u8x32<S>,
+    /// P2 where the brightness does not change.
+    pub p2: u8x32<S>,
+    /// The least P2.
+    pub least: u8x32<S>,
+}
+
+impl<S: Simd> PenaltyLanes<S> {
+    /// The penalties divided by the data weight w of eq. 6: scaling the data
+    /// term by w is scaling P1 and P2 by 1/w. `reciprocals` holds 255/w of each
+    /// pixel, and nothing where the weight is off.
+    #[inline(always)]
+    pub fn new(simd: S, penalties: Penalties, reciprocals: Option<&[u8; LANES]>) -> Self {
+        let scaled = |penalty: u8| match reciprocals {
+            None => u8x32::splat(simd, penalty),
+            Some(q) => u8x32::from_fn(simd, |i| ((penalty as u16 * q[i] as u16 + 127) / 255) as u8),
+        };
+        Self {
+            p1: scaled(penalties.p1),
+            p2: scaled(penalties.p2),
+            least: scaled(penalties.least_p2()),
+        }
+    }
+
+    /// P2 across a brightness step |dI|: lower where an edge makes a jump likely.
+    #[inline(always)]
+    pub fn p2_across(&self, step: u8x32<S>) -> u8x32<S> {
+        self.p2.saturating_sub(step).max(self.least)
+    }
+}

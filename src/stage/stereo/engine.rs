@@ -1,0 +1,243 @@
+//! Band after band through census, paths and winner, on any number of threads.
+
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use crate::image::Image;
+use crate::simd::prelude::*;
+use crate::simd::{LANES, Level, Simd, dispatch, u8x32};
+use crate::stage::stereo::census::Census;
+use crate::stage::stereo::cost::Penalties;
+use crate::stage::stereo::horizontal::Horizontal;
+use crate::stage::stereo::plan::{Band, Plan, Run};
+use crate::stage::stereo::vertical::Vertical;
+use crate::stage::stereo::volume::{RunShape, Seeds, Volume, Weight};
+use crate::stage::stereo::winner::{RightWinner, winners};
+use crate::stage::stereo::{Matches, NO_MATCH};
+
+/// What does not change from frame to frame.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// P1 and P2.
+    pub penalties: Penalties,
+    /// With the four diagonal paths.
+    pub diagonals: bool,
+    /// Rows above and below a band that its paths come from.
+    pub context: usize,
+    /// Percentage by which the best cost must beat the second best.
+    pub uniqueness_ratio: u32,
+    /// Disparities searched.
+    pub search: Range<usize>,
+}
+
+/// What is matched.
+#[derive(Clone, Copy)]
+pub struct Views<'a> {
+    /// Left gray view.
+    pub left: &'a Image<u8>,
+    /// Right gray view.
+    pub right: &'a Image<u8>,
+    /// Only where this is set, if given.
+    pub mask: Option<&'a Image<u8>>,
+    /// Coarse disparity at which paths start that come from outside.
+    pub coarse: Option<&'a Image<f32>>,
+    /// 255/w of eq. 6.
+    pub weight: Option<&'a Image<u8>>,
+}
+
+/// The matcher and its buffers.
+pub struct Engine {
+    level: Level,
+    settings: Settings,
+    /// One set of buffers per thread.
+    scratch: Vec<Mutex<Scratch>>,
+}
+
+#[derive(Default)]
+struct Scratch {
+    left: Census,
+    right: Census,
+    horizontal: Horizontal,
+    vertical: Vertical,
+    volume: Volume,
+    right_winner: RightWinner,
+}
+
+/// Rows of the result, from image row `y0` on.
+struct Rows<'a> {
+    y0: usize,
+    left: &'a mut [i16],
+    right: &'a mut [i16],
+    evidence: &'a mut [u8],
+    width: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn split(self, y: usize) -> (Self, Self) {
+        let at = (y - self.y0) * self.width;
+        let (left, left_rest) = self.left.split_at_mut(at);
+        let (right, right_rest) = self.right.split_at_mut(at);
+        let (evidence, evidence_rest) = self.evidence.split_at_mut(at);
+        let width = self.width;
+        (
+            Self { y0: self.y0, left, right, evidence, width },
+            Self { y0: y, left: left_rest, right: right_rest, evidence: evidence_rest, width },
+        )
+    }
+}
+
+impl Engine {
+    /// An engine for the current thread pool.
+    pub fn new(settings: Settings, level: Level) -> Self {
+        Self { level, settings, scratch: Vec::new() }
+    }
+
+    /// Settings in force.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Matches what `plan` says. Pixels outside it get [`NO_MATCH`].
+    pub fn run(&mut self, views: &Views<'_>, plan: &Plan, out: &mut Matches) {
+        let size = views.left.size();
+        out.left.resize(size);
+        out.left.fill(NO_MATCH);
+        out.right.resize(size);
+        out.right.fill(NO_MATCH);
+        out.evidence.resize(size);
+        out.evidence.fill(0);
+        let threads = rayon::current_num_threads();
+        while self.scratch.len() < threads {
+            self.scratch.push(Mutex::default());
+        }
+        let rows = Rows {
+            y0: 0,
+            left: out.left.pixels_mut(),
+            right: out.right.pixels_mut(),
+            evidence: out.evidence.pixels_mut(),
+            width: size.width,
+        };
+        self.bands(views, plan, &plan.bands, rows);
+    }
+
+    fn bands(&self, views: &Views<'_>, plan: &Plan, bands: &[Band], rows: Rows<'_>) {
+        match bands {
+            [] => {}
+            [band] => self.band(views, plan, band, rows),
+            _ => {
+                let (upper, lower) = bands.split_at(bands.len() / 2);
+                let (upper_rows, lower_rows) = rows.split(lower[0].y0);
+                rayon::join(
+                    || self.bands(views, plan, upper, upper_rows),
+                    || self.bands(views, plan, lower, lower_rows),
+                );
+            }
+        }
+    }
+
+    fn band(&self, views: &Views<'_>, plan: &Plan, band: &Band, rows: Rows<'_>) {
+        let index = rayon::current_thread_index().unwrap_or(0) % self.scratch.len();
+        // A poisoned lock means that another frame's band panicked; the
+        // buffers are overwritten in any case.
+        let mut scratch = self.scratch[index].lock().unwrap_or_else(PoisonError::into_inner);
+        let (_, mut rows) = rows.split(band.y0);
+        let settings = &self.settings;
+        dispatch!(self.level, simd => scratch.band(simd, settings, views, plan, band, &mut rows));
+    }
+}
+
+impl Scratch {
+    #[inline(always)]
+    fn band<S: Simd>(
+        &mut self,
+        simd: S,
+        settings: &Settings,
+        views: &Views<'_>,
+        plan: &Plan,
+        band: &Band,
+        rows: &mut Rows<'_>,
+    ) {
+        let width = views.left.width();
+        let height = band.y1 - band.y0;
+        self.right_winner.reset(width, height, band.lo, band.hi);
+        for run in &plan.runs[band.runs.clone()] {
+            self.run(simd, settings, views, plan, band, run, rows);
+        }
+        for (y, out) in rows.right.chunks_exact_mut(width).take(height).enumerate() {
+            self.right_winner.finish(y, out);
+        }
+    }
+
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "what a run is made from")]
+    fn run<S: Simd>(
+        &mut self,
+        simd: S,
+        settings: &Settings,
+        views: &Views<'_>,
+        plan: &Plan,
+        band: &Band,
+        run: &Run,
+        rows: &mut Rows<'_>,
+    ) {
+        let size = views.left.size();
+        let shape = RunShape {
+            tiles: &plan.tiles[run.tiles.clone()],
+            rows: band.y1 - band.y0,
+            context_above: settings.context.min(band.y0),
+            context_below: settings.context.min(size.height - band.y1),
+            lo: run.lo,
+            hi: run.hi,
+            weight: views.weight.map(|image| Weight { image, x0: run.x0, y0: band.y0 }),
+        };
+        let y0 = band.y0 - shape.context_above;
+        let all_rows = shape.context_above + shape.rows + shape.context_below;
+        let x0 = run.x0 as isize;
+        self.left.run(simd, views.left, x0, shape.width(), y0, all_rows);
+        let right_x0 = x0 + 1 - run.hi as isize;
+        self.right.run(simd, views.right, right_x0, shape.right_width(), y0, all_rows);
+        self.volume.resize(shape.tiles);
+        let seeds = views.coarse.map(|coarse| Seeds {
+            coarse,
+            x0: run.x0,
+            y0: band.y0,
+            left: 0,
+            right: shape.width() - 1,
+        });
+        let (left, right, seeds) = (&self.left, &self.right, seeds.as_ref());
+        let penalties = settings.penalties;
+        self.horizontal.run(simd, &shape, penalties, left, right, seeds, &mut self.volume);
+        let volume = &mut self.volume;
+        let right_winner = &mut self.right_winner;
+        let mut finish =
+            |k: usize, y: usize, costs: &[crate::simd::Block], floors: &[u16; LANES]| {
+                let x = run.x0 + k * LANES;
+                let inside = (size.width - x).min(LANES);
+                let outside = u8x32::from_fn(simd, |i| if i < inside { 0 } else { 255 });
+                let tile = &shape.tiles[k];
+                right_winner.vote(simd, (x, y), tile.lo, costs, outside);
+                let found = winners(simd, costs, tile.lo, floors, settings.uniqueness_ratio);
+                let at = y * size.width + x;
+                let left = &mut rows.left[at..at + inside];
+                let evidence = &mut rows.evidence[at..at + inside];
+                left.copy_from_slice(&found.disparity[..inside]);
+                evidence.copy_from_slice(&found.evidence[..inside]);
+                if let Some(mask) = views.mask {
+                    let mask = &mask.row(band.y0 + y)[x..x + inside];
+                    for ((d, e), &m) in left.iter_mut().zip(evidence).zip(mask) {
+                        if m == 0 {
+                            (*d, *e) = (NO_MATCH, 0);
+                        }
+                    }
+                }
+            };
+        let v = &mut self.vertical;
+        if settings.diagonals {
+            v.down::<S, true>(simd, &shape, penalties, left, right, seeds, volume);
+            v.up::<S, true>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+        } else {
+            v.down::<S, false>(simd, &shape, penalties, left, right, seeds, volume);
+            v.up::<S, false>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+        }
+    }
+}
