@@ -55,11 +55,8 @@ impl Overlap {
                 matched[r] = true;
             }
         }
-        for r in 0..self.regions {
-            if !matched[r] {
-                let mut visited = vec![false; self.objects];
-                matched[r] = augment(r, &neighbours, &mut visited, &mut region_of);
-            }
+        for r in (0..self.regions).filter(|r| !matched[*r]) {
+            augment(r, &neighbours, &mut vec![false; self.objects], &mut region_of);
         }
         let pairs = region_of.iter().enumerate().filter_map(|(o, r)| Some(((*r)?, o))).collect();
         Matching { regions: self.regions, objects: self.objects, pairs }

@@ -115,16 +115,13 @@ pub fn region_color(region: &Region) -> [u8; 3] {
 /// `#7 12.4 m 93%`; the parts without a measurement are left out.
 pub fn label_text(region: &Region) -> String {
     let id = if region.track_id == 0 { u32::from(region.label) } else { region.track_id };
-    let mut text = format!("#{id}");
     let depth = region.median_depth;
-    if depth.is_finite() {
-        let decimals = if depth < 10.0 { 2 } else { 1 };
-        text.push_str(&format!(" {depth:.decimals$} m"));
-    }
-    if region.confidence.is_finite() {
-        text.push_str(&format!(" {:.0}%", unit(region.confidence) * 100.0));
-    }
-    text
+    let decimals = if depth < 10.0 { 2 } else { 1 };
+    let distance = if depth.is_finite() { format!(" {depth:.decimals$} m") } else { String::new() };
+    let share = unit(region.confidence) * 100.0;
+    let confidence =
+        if region.confidence.is_finite() { format!(" {share:.0}%") } else { String::new() };
+    format!("#{id}{distance}{confidence}")
 }
 
 /// PNG bytes of a colour picture.

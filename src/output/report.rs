@@ -4,6 +4,12 @@
 //! Memory and file are bounded whatever the length of the run: frames, plots
 //! and times are evenly thinned out.
 
+#![allow(
+    clippy::format_push_string,
+    clippy::format_collect,
+    reason = "a page is put together once per run: that it can be read counts, not an allocation"
+)]
+
 mod keep;
 mod layer;
 mod page;

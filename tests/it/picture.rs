@@ -118,6 +118,8 @@ fn salient_border_and_rest_of_the_roi_differ() {
     assert!(rest.iter().all(|c| *c < 80), "the rest is dim: {rest:?}");
 }
 
+type Draw = fn(&Perception, &mut Image<[u8; 3]>);
+
 #[test]
 fn every_picture_works_at_any_size_and_with_boxes_over_the_edge() {
     for (width, height) in [(1, 1), (2, 3), (17, 5), (5, 17), (333, 97), (1243, 376)] {
@@ -130,7 +132,7 @@ fn every_picture_works_at_any_size_and_with_boxes_over_the_edge() {
         add_region(&mut seen, [0, 0, 3, 3]);
         seen.regions[3].contour = vec![[f32::NAN, 0.0], [f32::INFINITY, 1e9]];
         seen.regions[3].mask.truncate(4); // shorter than the box says
-        let draw: [fn(&Perception, &mut Image<[u8; 3]>); 5] = [
+        let draw: [Draw; 5] = [
             picture::regions,
             picture::roi,
             picture::saliency,

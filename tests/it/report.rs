@@ -315,7 +315,7 @@ fn scores_of_a_run_that_is_right_up_to_half_a_pixel() {
     assert_eq!(summary.id_switches, Some(0));
     assert_eq!(summary.roi.unwrap().objects_95, Some(1.0));
     // Z = fB/(d + 0.5) instead of fB/d, for d = 8 and 4.
-    let expected = (0.5 / 8.5 + 0.5 / 4.5) / 2.0;
+    let expected = f64::midpoint(0.5 / 8.5, 0.5 / 4.5);
     assert!((summary.distance.unwrap().mean_relative_error - expected).abs() < 1e-6);
     let json = serde_json::to_value(&summary).unwrap();
     assert_eq!(json["regions_by_mask"][1]["iou"], 0.5);

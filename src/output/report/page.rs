@@ -1,5 +1,6 @@
 //! The page: the template with the run's figures in it.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 
 use base64::Engine as _;
@@ -147,21 +148,21 @@ fn kpis(report: &ReportSink) -> String {
             out += &kpi(
                 &format!("{:.2}", row.f1),
                 "F1",
-                &format!("regions at IoU ≥ 0.5 · P {p} R {r}"),
+                &format!("regions · P {p} R {r}"),
             );
         }
         if let Some(row) = &summary.disparity_in_roi {
             out += &kpi(
                 &format!("{:.2}", row.epe_px),
                 "px",
-                &format!("end-point error · D1 {}", percent(row.d1)),
+                &format!("disparity error · D1 {}", percent(row.d1)),
             );
         }
         if let Some(row) = &summary.distance {
             out += &kpi(
                 &percent(row.mean_relative_error),
                 "",
-                &format!("mean distance error · {:.2} m", row.mean_error_m),
+                &format!("distance error · {:.2} m", row.mean_error_m),
             );
         }
     }
@@ -172,7 +173,7 @@ fn kpis(report: &ReportSink) -> String {
 const LABELLED_TRACKS: usize = 14;
 
 fn tracks(report: &ReportSink) -> String {
-    let mut lines: std::collections::BTreeMap<u32, Vec<(f64, f64)>> = Default::default();
+    let mut lines: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
     for row in report.rows.items() {
         for (id, distance) in row.distances.iter().filter(|(id, _)| *id != 0) {
             lines.entry(*id).or_default().push((row.index as f64, f64::from(*distance)));

@@ -29,13 +29,7 @@ pub fn script_safe(json: &str) -> String {
 
 /// Milliseconds with three meaningful digits.
 pub fn ms(value: f64) -> String {
-    let decimals = if value < 10.0 {
-        2
-    } else if value < 100.0 {
-        1
-    } else {
-        0
-    };
+    let decimals = usize::from(value < 10.0) + usize::from(value < 100.0);
     format!("{value:.decimals$}")
 }
 
