@@ -10,6 +10,7 @@
     reason = "a page is put together once per run: that it can be read counts, not an allocation"
 )]
 
+mod frames;
 mod keep;
 mod layer;
 mod page;
