@@ -1,5 +1,6 @@
 //! Doors in: where stereo frames come from.
 
+pub mod bag;
 pub mod live;
 
 use std::collections::BTreeMap;
