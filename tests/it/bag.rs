@@ -4,6 +4,7 @@
 mod broken;
 mod choice;
 mod recipe;
+mod sink;
 
 use std::fs;
 

@@ -1,0 +1,176 @@
+//! Perceptions into a bag.
+
+use std::path::Path;
+
+use super::write::{BagWriteError, BagWriter, Packing, Topic};
+use crate::config::{Config, DepthEncoding};
+use crate::image::Image;
+use crate::input::Observation;
+use crate::output::{Sink, picture};
+use crate::perception::Perception;
+use crate::ros::convert;
+use crate::ros::message::salient_stereo_msgs::SalientRegionArray;
+use crate::ros::message::sensor_msgs::{self, CameraInfo, CompressedImage};
+use crate::ros::message::stereo_msgs::DisparityImage;
+use crate::stamp::Stamp;
+
+const OVERLAY_QUALITY: u8 = 90;
+
+/// Which topics a bag of results has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools, reason = "one switch per topic")]
+pub struct BagTopicsOut {
+    /// `/regions`
+    pub regions: bool,
+    /// `/disparity`
+    pub disparity: bool,
+    /// `/depth/image_rect` and `/depth/camera_info`
+    pub depth: bool,
+    /// `/confidence/image_rect`
+    pub confidence: bool,
+    /// `/saliency/image_rect`
+    pub saliency: bool,
+    /// `/regions/label_image`
+    pub labels: bool,
+    /// `/overlay/image/compressed` (JPEG)
+    pub overlay: bool,
+    /// `/left/image_rect`, the left view as processed, to be seen beside the results.
+    pub left: bool,
+}
+
+impl Default for BagTopicsOut {
+    /// All results and the overlay, without the left view, which the input has.
+    fn default() -> Self {
+        Self {
+            regions: true,
+            disparity: true,
+            depth: true,
+            confidence: true,
+            saliency: true,
+            labels: true,
+            overlay: true,
+            left: false,
+        }
+    }
+}
+
+/// Writes what the pipeline yields as the messages that the node publishes,
+/// under the node's topic names. Log time is the stamp of the left image, so
+/// the same frames give the same bytes.
+pub struct BagSink {
+    bag: BagWriter,
+    topics: Topics,
+    masks: bool,
+    depth_encoding: DepthEncoding,
+    overlay: Image<[u8; 3]>,
+}
+
+struct Topics {
+    regions: Option<Topic<SalientRegionArray>>,
+    disparity: Option<Topic<DisparityImage>>,
+    depth: Option<(Topic<sensor_msgs::Image>, Topic<CameraInfo>)>,
+    confidence: Option<Topic<sensor_msgs::Image>>,
+    saliency: Option<Topic<sensor_msgs::Image>>,
+    labels: Option<Topic<sensor_msgs::Image>>,
+    overlay: Option<Topic<CompressedImage>>,
+    left: Option<Topic<sensor_msgs::Image>>,
+}
+
+impl BagSink {
+    /// A bag at `path`: a single file when it ends in `.mcap`, else a folder.
+    ///
+    /// # Errors
+    /// When file or folder cannot be made.
+    pub fn create(
+        path: &Path,
+        config: &Config,
+        wanted: BagTopicsOut,
+    ) -> Result<Self, BagWriteError> {
+        let mut bag = BagWriter::create_packed(path, Packing::Zstd)?;
+        let topics = Topics::add(&mut bag, wanted)?;
+        Ok(Self {
+            bag,
+            topics,
+            masks: config.regions.publish_masks,
+            depth_encoding: config.depth.encoding,
+            overlay: Image::default(),
+        })
+    }
+
+    /// The `.mcap` file.
+    pub fn file(&self) -> &Path {
+        self.bag.file()
+    }
+}
+
+impl Topics {
+    fn add(bag: &mut BagWriter, wanted: BagTopicsOut) -> Result<Self, BagWriteError> {
+        // A topic that is not wanted is not announced either.
+        let image = |bag: &mut BagWriter, wanted: bool, name: &str| {
+            wanted.then(|| bag.topic::<sensor_msgs::Image>(name)).transpose()
+        };
+        Ok(Self {
+            regions: wanted.regions.then(|| bag.topic("/regions")).transpose()?,
+            disparity: wanted.disparity.then(|| bag.topic("/disparity")).transpose()?,
+            depth: match image(bag, wanted.depth, "/depth/image_rect")? {
+                Some(depth) => Some((depth, bag.topic("/depth/camera_info")?)),
+                None => None,
+            },
+            confidence: image(bag, wanted.confidence, "/confidence/image_rect")?,
+            saliency: image(bag, wanted.saliency, "/saliency/image_rect")?,
+            labels: image(bag, wanted.labels, "/regions/label_image")?,
+            overlay: wanted.overlay.then(|| bag.topic("/overlay/image/compressed")).transpose()?,
+            left: image(bag, wanted.left, "/left/image_rect")?,
+        })
+    }
+}
+
+/// Writes the message when the topic is wanted.
+fn put<T: crate::ros::message::Message>(
+    bag: &mut BagWriter,
+    topic: Option<Topic<T>>,
+    stamp: Stamp,
+    message: impl FnOnce() -> T,
+) -> Result<(), BagWriteError> {
+    topic.map_or(Ok(()), |topic| bag.write(topic, stamp, &message()))
+}
+
+impl Sink for BagSink {
+    type Error = BagWriteError;
+
+    fn write(
+        &mut self,
+        _observation: &Observation,
+        perception: &Perception,
+    ) -> Result<(), BagWriteError> {
+        let Self { bag, topics, overlay, .. } = self;
+        let stamp = perception.stamp;
+        let header = || convert::header(perception);
+        put(bag, topics.left, stamp, || convert::rgb_image(&perception.left.rgb, header()))?;
+        put(bag, topics.regions, stamp, || convert::region_array(perception, self.masks))?;
+        put(bag, topics.disparity, stamp, || convert::disparity_image(perception))?;
+        let (depth, info) = topics.depth.unzip();
+        put(bag, depth, stamp, || convert::depth_image(perception, self.depth_encoding))?;
+        put(bag, info, stamp, || convert::depth_camera_info(perception))?;
+        put(bag, topics.confidence, stamp, || convert::confidence_image(perception))?;
+        put(bag, topics.saliency, stamp, || convert::saliency_image(perception))?;
+        put(bag, topics.labels, stamp, || convert::label_image(&perception.labels, header()))?;
+        if topics.overlay.is_some() {
+            picture::regions(perception, overlay);
+            // Fails for an empty picture only, which has no overlay to show.
+            if let Ok(data) = picture::jpeg(overlay, OVERLAY_QUALITY) {
+                let format = "rgb8; jpeg compressed bgr8".to_owned();
+                put(bag, topics.overlay, stamp, || CompressedImage {
+                    header: header(),
+                    format,
+                    data,
+                })?;
+            }
+        }
+        bag.flush()
+    }
+
+    fn finish(&mut self) -> Result<(), BagWriteError> {
+        self.bag.finish()
+    }
+}
