@@ -19,6 +19,7 @@ mod it {
     #[cfg(feature = "tool")]
     mod report;
     mod roi;
+    mod saliency;
     mod sync;
     mod track;
     #[cfg(feature = "tool")]

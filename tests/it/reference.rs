@@ -3,6 +3,7 @@
 
 pub mod preprocess;
 pub mod roi;
+pub mod saliency;
 
 use salient_stereo::image::{Image, Size};
 

@@ -32,9 +32,13 @@ fn bits(mask: &Mask) -> BitMask {
 fn flags(bits: &BitMask) -> Mask {
     let mut bytes = Image::default();
     bits.write(&mut bytes);
-    assert_eq!(bits.count(), bytes.pixels().iter().filter(|&&v| v == 255).count());
+    assert_eq!(bits.count(), set_pixels(&bytes));
     assert!(bytes.pixels().iter().all(|&v| v == 0 || v == 255));
     of(&bytes)
+}
+
+fn set_pixels(bytes: &Image<u8>) -> usize {
+    of(bytes).pixels().iter().filter(|&&set| set).count()
 }
 
 fn of(bytes: &Image<u8>) -> Mask {
@@ -239,16 +243,12 @@ fn the_budget_keeps_the_most_salient_tiles() {
             }
         }
         // A dropped tile is no better than any kept one, or did not fit.
-        let spare = (limit * SIZE.area() as f64) as usize - share_in_pixels(&out);
+        let spare = (limit * SIZE.area() as f64) as usize - set_pixels(&out.matched);
         let worst = kept.iter().map(|t| t.0).fold(f32::INFINITY, f32::min);
         for (mean, area) in dropped {
             assert!(mean <= worst + 1.0 / 256.0 || area > spare, "{mean} was dropped for {worst}");
         }
     }
-}
-
-fn share_in_pixels(out: &RoiMask) -> usize {
-    out.matched.pixels().iter().filter(|&&v| v == 255).count()
 }
 
 #[test]

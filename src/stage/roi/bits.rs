@@ -98,11 +98,15 @@ impl BitMask {
         let rows = self.words.par_chunks_exact(self.stride);
         out.pixels_mut().par_chunks_exact_mut(self.size.width).zip(rows).with_min_len(64).for_each(
             |(row, words)| {
-                for (values, word) in row.chunks_mut(WORD).zip(words) {
-                    for (values, byte) in values.chunks_mut(8).zip(word.to_le_bytes()) {
-                        let spread = SPREAD[usize::from(byte)].to_le_bytes();
-                        values.copy_from_slice(&spread[..values.len()]);
+                let (whole, cut) = row.as_chunks_mut::<WORD>();
+                for (values, word) in whole.iter_mut().zip(words) {
+                    let (eights, _) = values.as_chunks_mut::<8>();
+                    for (values, byte) in eights.iter_mut().zip(word.to_le_bytes()) {
+                        *values = SPREAD[usize::from(byte)].to_le_bytes();
                     }
+                }
+                for (bit, value) in cut.iter_mut().enumerate() {
+                    *value = if words[whole.len()] >> bit & 1 == 1 { 255 } else { 0 };
                 }
             },
         );

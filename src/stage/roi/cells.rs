@@ -79,29 +79,37 @@ impl Components {
         for y in 0..height {
             let here = counts.row(y);
             let above = if y > 0 { counts.row(y - 1) } else { &[] };
+            let occupied = |x: usize| above.get(x).is_some_and(|&count| count > 0);
             for x in (0..width).filter(|&x| here[x] > 0) {
                 let i = y * width + x;
+                // The cell above touches all other neighbours that came before.
+                if occupied(x) {
+                    join(parents, i, i - width);
+                    continue;
+                }
                 if x > 0 && here[x - 1] > 0 {
                     join(parents, i, i - 1);
+                } else if x > 0 && occupied(x - 1) {
+                    join(parents, i, i - width - 1);
                 }
-                for (column, &count) in
-                    above.iter().enumerate().take(x + 2).skip(x.saturating_sub(1))
-                {
-                    if count > 0 {
-                        join(parents, i, (y - 1) * width + column);
-                    }
+                if occupied(x + 1) {
+                    join(parents, i, i - width + 1);
                 }
             }
+        }
+        // A parent never comes after its child: one pass makes all of them roots.
+        for i in 0..parents.len() {
+            parents[i] = parents[parents[i] as usize];
         }
         self.areas.clear();
         self.areas.resize(width * height, 0);
         for (i, &count) in counts.pixels().iter().enumerate() {
             if count > 0 {
-                self.areas[root(parents, i)] += u32::from(count);
+                self.areas[parents[i] as usize] += u32::from(count);
             }
         }
         let areas = &self.areas;
-        retain_cells(mask, |x, y| areas[root(parents, y * width + x)] >= min_area);
+        retain_cells(mask, |x, y| areas[parents[y * width + x] as usize] >= min_area);
     }
 }
 

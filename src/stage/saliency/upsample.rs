@@ -22,20 +22,24 @@ pub fn upsample(cells: &Image<f32>, size: Size, out: &mut Image<f32>) {
             let vertical = |x: usize| upper[x] + share * (lower[x] - upper[x]);
             let mut left = vertical(0);
             let mut here = left;
-            for (x, pixels) in out.chunks_mut(CELL).enumerate() {
-                let right = if x + 1 < cells.width() { vertical(x + 1) } else { here };
-                let (before, after) = (left - here, right - here);
-                let four = [
-                    here + 0.375 * before,
-                    here + 0.125 * before,
-                    here + 0.125 * after,
-                    here + 0.375 * after,
-                ];
-                pixels.copy_from_slice(&four[..pixels.len()]);
+            // Whole cells first: their length is known and they vectorise.
+            let (whole, cut) = out.as_chunks_mut::<CELL>();
+            let after = |x: usize| vertical((x + 1).min(cells.width() - 1));
+            for (x, pixels) in whole.iter_mut().enumerate() {
+                let right = after(x);
+                *pixels = across(left, here, right);
                 (left, here) = (here, right);
             }
+            let pixels = across(left, here, after(cells.width() - 1));
+            cut.copy_from_slice(&pixels[..cut.len()]);
         },
     );
+}
+
+/// The four pixels of a cell from its value and those of its neighbours.
+fn across(left: f32, here: f32, right: f32) -> [f32; CELL] {
+    let (before, after) = (left - here, right - here);
+    [here + 0.375 * before, here + 0.125 * before, here + 0.125 * after, here + 0.375 * after]
 }
 
 /// The cells on both sides of pixel `at`, and the share of the second.
