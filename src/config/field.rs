@@ -164,12 +164,12 @@ pub const FIELDS: &[Field] = &[
     live("stereo.disparity_range", Integer(16, 512), "Number of disparities searched, in pixels."),
     live(
         "stereo.p1",
-        Integer(0, 255),
+        Integer(0, 100),
         "Penalty of a disparity step of one pixel, in units of the matching cost.",
     ),
     live(
         "stereo.p2",
-        Integer(0, 255),
+        Integer(0, 100),
         "Penalty of a larger disparity step, in units of the matching cost.",
     ),
     live(

@@ -5,7 +5,7 @@ use crate::image::{Image, Size};
 use crate::perception::{DISPARITY_STEP, View};
 use crate::simd::Level;
 use crate::stage::stereo::cost::Penalties;
-use crate::stage::stereo::engine::{Engine, Settings, Views};
+use crate::stage::stereo::engine::{Engine, Method, Settings, Views};
 use crate::stage::stereo::plan::Plan;
 use crate::stage::stereo::winner::STEPS;
 use crate::stage::stereo::{Matches, NO_MATCH};
@@ -42,10 +42,10 @@ impl Coarse {
         let hi = lo + stereo.disparity_range.max(1) as usize;
         let settings = Settings {
             penalties: Penalties {
-                p1: stereo.p1.clamp(0, 255) as u8,
-                p2: stereo.p2.clamp(stereo.p1, 255) as u8,
+                p1: stereo.p1.clamp(0, 100) as u8,
+                p2: stereo.p2.clamp(stereo.p1, 100) as u8,
             },
-            diagonals: false,
+            method: Method::FourPaths,
             context: 8,
             uniqueness_ratio: 0,
             search: lo / CELL..hi.div_ceil(CELL) + 1,

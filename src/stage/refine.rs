@@ -1,17 +1,23 @@
 //! From raw matches to disparity and confidence.
 
+pub mod median;
 pub mod speckle;
+
+use std::ops::Range;
 
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{DISPARITY_STEP, RoiMask};
+use crate::simd::{self, Level, Simd, dispatch};
+use crate::stage::refine::median::median_row;
 use crate::stage::refine::speckle::Speckles;
 use crate::stage::stereo::winner::STEPS;
 use crate::stage::stereo::{Matches, NO_MATCH};
 
 /// Left-right check, median, speckle filter, confidence.
 pub struct Refine {
+    level: Level,
     size: Size,
     max_difference: Option<i32>,
     speckle_size: usize,
@@ -25,8 +31,14 @@ pub struct Refine {
 impl Refine {
     /// The stage for images of `size`.
     pub fn new(config: &Config, size: Size) -> Self {
+        Self::with_level(config, size, simd::detect())
+    }
+
+    /// The stage with the instructions of `level`.
+    pub fn with_level(config: &Config, size: Size, level: Level) -> Self {
         let stereo = &config.stereo;
         Self {
+            level,
             size,
             max_difference: (stereo.disp12_max_diff >= 0)
                 .then_some(stereo.disp12_max_diff as i32 * STEPS + STEPS / 2),
@@ -53,35 +65,87 @@ impl Refine {
         disparity.fill(f32::NAN);
         confidence.resize(self.size);
         confidence.fill(0.0);
-        let rows = matched_rows(&roi.matched);
+        let area = Area::of(&roi.matched);
         self.checked.resize(self.size);
         self.smooth.resize(self.size);
-        for y in rows.clone() {
-            check_row(matches, y, self.max_difference, self.checked.row_mut(y));
+        for y in area.rows.clone() {
+            check_row(matches, y, self.max_difference, &area, self.checked.row_mut(y));
         }
-        for y in rows.clone() {
-            median_row(&self.checked, &rows, y, self.smooth.row_mut(y));
-        }
+        let (checked, smooth) = (&self.checked, &mut self.smooth);
+        dispatch!(self.level, simd => median(simd, checked, &area, smooth));
         if self.speckle_size > 1 {
-            self.speckles.remove(&mut self.smooth, &rows, self.speckle_size, self.speckle_range);
+            self.speckles.remove(&mut self.smooth, &area, self.speckle_size, self.speckle_range);
         }
         let offset = rig.disparity_offset() as f32;
-        for y in rows {
-            let evidence = matches.evidence.row(y);
-            let raw = matches.left.row(y);
-            let out = disparity.row_mut(y).iter_mut().zip(confidence.row_mut(y));
-            for (x, ((d, c), &smooth)) in out.zip(self.smooth.row(y)).enumerate() {
-                if smooth == NO_MATCH {
+        let columns = area.columns.clone();
+        for y in area.rows {
+            let evidence = &matches.evidence.row(y)[columns.clone()];
+            let raw = &matches.left.row(y)[columns.clone()];
+            let smooth = &self.smooth.row(y)[columns.clone()];
+            let disparity = &mut disparity.row_mut(y)[columns.clone()];
+            let confidence = &mut confidence.row_mut(y)[columns.clone()];
+            for (x, (d, c)) in disparity.iter_mut().zip(confidence).enumerate() {
+                if smooth[x] == NO_MATCH {
                     continue;
                 }
-                let moved = (i32::from(raw[x]) - i32::from(smooth)).abs();
+                let moved = (i32::from(raw[x]) - i32::from(smooth[x])).abs();
                 let value = trust(evidence[x], moved);
                 if value >= self.min_confidence {
-                    *d = f32::from(smooth) * DISPARITY_STEP - offset;
+                    *d = f32::from(smooth[x]) * DISPARITY_STEP - offset;
                     *c = value;
                 }
             }
         }
+    }
+}
+
+/// Rows and columns that hold all pixels to match.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// From the first row with such a pixel to the last one.
+    pub rows: Range<usize>,
+    /// From the first column with such a pixel to the last one.
+    pub columns: Range<usize>,
+}
+
+impl Area {
+    /// The bounds of what is set in `mask`.
+    pub fn of(mask: &Image<u8>) -> Self {
+        let width = mask.width();
+        let (mut rows, mut columns) = (0..0, width..0);
+        for (y, row) in mask.rows().enumerate() {
+            if row.iter().fold(0, |any, &v| any | v) == 0 {
+                continue;
+            }
+            if rows.is_empty() {
+                rows.start = y;
+            }
+            rows.end = y + 1;
+            // Only what lies outside the columns so far is looked at.
+            if let Some(x) = row[..columns.start].iter().position(|&v| v != 0) {
+                columns.start = x;
+            }
+            if let Some(x) = row[columns.end..].iter().rposition(|&v| v != 0) {
+                columns.end += x + 1;
+            }
+        }
+        if rows.is_empty() { Self { rows: 0..0, columns: 0..0 } } else { Self { rows, columns } }
+    }
+}
+
+#[inline(always)]
+fn median<S: Simd>(simd: S, checked: &Image<i16>, area: &Area, smooth: &mut Image<i16>) {
+    let columns = &area.columns;
+    for y in area.rows.clone() {
+        let above = checked.row(y.max(area.rows.start + 1) - 1);
+        let below = checked.row((y + 1).min(area.rows.end - 1));
+        median_row(
+            simd,
+            &above[columns.clone()],
+            &checked.row(y)[columns.clone()],
+            &below[columns.clone()],
+            &mut smooth.row_mut(y)[columns.clone()],
+        );
     }
 }
 
@@ -92,26 +156,23 @@ fn trust(evidence: u8, moved: i32) -> f32 {
     if moved > STEPS { 0.5 * trust } else { trust }
 }
 
-/// Rows from the first to the last that has a pixel to match.
-fn matched_rows(mask: &Image<u8>) -> std::ops::Range<usize> {
-    let any = |y: &usize| mask.row(*y).iter().fold(0, |any, &v| any | v) != 0;
-    let first = (0..mask.height()).find(any);
-    let last = (0..mask.height()).rev().find(any);
-    match (first, last) {
-        (Some(first), Some(last)) => first..last + 1,
-        _ => 0..0,
-    }
-}
-
 /// Drops disparities that the right view contradicts.
-fn check_row(matches: &Matches, y: usize, max_difference: Option<i32>, out: &mut [i16]) {
+fn check_row(
+    matches: &Matches,
+    y: usize,
+    max_difference: Option<i32>,
+    area: &Area,
+    out: &mut [i16],
+) {
     let left = matches.left.row(y);
     let Some(max_difference) = max_difference else {
         out.copy_from_slice(left);
         return;
     };
     let right = matches.right.row(y);
-    for (x, (out, &d)) in out.iter_mut().zip(left).enumerate() {
+    for (x, (out, &d)) in
+        out.iter_mut().zip(left).enumerate().take(area.columns.end).skip(area.columns.start)
+    {
         *out = NO_MATCH;
         if d == NO_MATCH {
             continue;
@@ -128,61 +189,4 @@ fn check_row(matches: &Matches, y: usize, max_difference: Option<i32>, out: &mut
             *out = d;
         }
     }
-}
-
-/// Median of the valid pixels in the 3x3 window of every valid pixel.
-fn median_row(image: &Image<i16>, rows: &std::ops::Range<usize>, y: usize, out: &mut [i16]) {
-    let above = image.row(y.saturating_sub(1).max(rows.start));
-    let here = image.row(y);
-    let below = image.row((y + 1).min(rows.end - 1));
-    let width = here.len();
-    for x in 0..width {
-        if here[x] == NO_MATCH {
-            out[x] = NO_MATCH;
-            continue;
-        }
-        let (l, r) = (x.saturating_sub(1), (x + 1).min(width - 1));
-        let mut window =
-            [above[l], above[x], above[r], here[l], here[x], here[r], below[l], below[x], below[r]];
-        if window.contains(&NO_MATCH) {
-            window.sort_unstable();
-            let none = window.iter().take_while(|&&d| d == NO_MATCH).count();
-            out[x] = window[none + (9 - none) / 2];
-        } else {
-            out[x] = median9(window);
-        }
-    }
-}
-
-/// Median of nine by the least number of exchanges (Paeth 1990).
-fn median9(mut p: [i16; 9]) -> i16 {
-    let mut sort = |a: usize, b: usize| {
-        let (low, high) = (p[a].min(p[b]), p[a].max(p[b]));
-        p[a] = low;
-        p[b] = high;
-    };
-    for (a, b) in [
-        (1, 2),
-        (4, 5),
-        (7, 8),
-        (0, 1),
-        (3, 4),
-        (6, 7),
-        (1, 2),
-        (4, 5),
-        (7, 8),
-        (0, 3),
-        (5, 8),
-        (4, 7),
-        (3, 6),
-        (1, 4),
-        (2, 5),
-        (4, 7),
-        (4, 2),
-        (6, 4),
-        (4, 2),
-    ] {
-        sort(a, b);
-    }
-    p[4]
 }

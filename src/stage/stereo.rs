@@ -1,5 +1,6 @@
 //! Stereo correspondence inside the region of interest.
 
+pub mod block;
 pub mod census;
 pub mod cost;
 pub mod engine;
@@ -9,13 +10,14 @@ pub mod vertical;
 pub mod volume;
 pub mod winner;
 
-use crate::config::Config;
+use crate::config::{Algorithm, Config};
 use crate::image::{Image, Size};
 use crate::perception::{RoiMask, View};
 use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
+use crate::stage::stereo::block::Measure;
 use crate::stage::stereo::cost::Penalties;
-use crate::stage::stereo::engine::{Engine, Settings, Views};
+use crate::stage::stereo::engine::{Engine, Method, Settings, Views};
 use crate::stage::stereo::plan::Plan;
 
 /// Value of a pixel without a match.
@@ -50,10 +52,14 @@ impl Stereo {
         let lo = stereo.min_disparity.max(0) as usize;
         let settings = Settings {
             penalties: Penalties {
-                p1: stereo.p1.clamp(0, 255) as u8,
-                p2: stereo.p2.clamp(stereo.p1, 255) as u8,
+                p1: stereo.p1.clamp(0, 100) as u8,
+                p2: stereo.p2.clamp(stereo.p1, 100) as u8,
             },
-            diagonals: true,
+            method: match stereo.algorithm {
+                Algorithm::SemiGlobal => Method::EightPaths,
+                Algorithm::Block => Method::Block(Measure::Absolute),
+                Algorithm::CensusBlock => Method::Block(Measure::Census),
+            },
             context: 8,
             uniqueness_ratio: stereo.uniqueness_ratio.max(0) as u32,
             search: lo..lo + stereo.disparity_range.max(1) as usize,

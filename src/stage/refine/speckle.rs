@@ -1,8 +1,7 @@
 //! Removal of small patches of disparity.
 
-use std::ops::Range;
-
 use crate::image::Image;
+use crate::stage::refine::Area;
 use crate::stage::stereo::NO_MATCH;
 
 /// Connected patches, run by run.
@@ -23,22 +22,17 @@ struct Stretch {
 }
 
 impl Speckles {
-    /// Sets to [`NO_MATCH`] every 4-connected patch of fewer than `least`
+    /// Inside `area`, sets to [`NO_MATCH`] every 4-connected patch of fewer than `least`
     /// pixels in which neighbours differ by at most `range` steps.
-    pub fn remove(
-        &mut self,
-        image: &mut Image<i16>,
-        rows: &Range<usize>,
-        least: usize,
-        range: i32,
-    ) {
+    pub fn remove(&mut self, image: &mut Image<i16>, area: &Area, least: usize, range: i32) {
+        let (rows, columns) = (&area.rows, &area.columns);
         self.runs.clear();
         self.rows.clear();
         let close = |a: i16, b: i16| (i32::from(a) - i32::from(b)).abs() <= range;
         for y in rows.clone() {
             self.rows.push(self.runs.len());
-            let row = image.row(y);
-            let mut x = 0;
+            let row = &image.row(y)[..columns.end];
+            let mut x = columns.start;
             while x < row.len() {
                 if row[x] == NO_MATCH {
                     x += 1;

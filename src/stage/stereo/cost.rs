@@ -1,7 +1,7 @@
 //! The matching cost: how many bits of two census descriptors differ.
 
 use crate::simd::prelude::*;
-use crate::simd::{LANES, Simd, load, u8x32};
+use crate::simd::{Block, LANES, Simd, load, load_block, u8x32};
 use crate::stage::stereo::census::PLANES;
 
 /// Largest cost of one pixel: all 31 pairs differ.
@@ -24,8 +24,8 @@ pub fn descriptors<S: Simd>(simd: S, planes: &[u8], stride: usize, at: usize) ->
 /// Hamming distance of 32 pairs of descriptors.
 #[inline(always)]
 pub fn hamming<S: Simd>(a: &Descriptors<S>, b: &Descriptors<S>) -> u8x32<S> {
-    let ones = |k: usize| (a[k] ^ b[k]).count_ones();
-    (ones(0) + ones(1)) + (ones(2) + ones(3))
+    ((a[0] ^ b[0]).count_ones() + (a[1] ^ b[1]).count_ones())
+        + ((a[2] ^ b[2]).count_ones() + (a[3] ^ b[3]).count_ones())
 }
 
 /// Penalties of a disparity step between two pixels.
@@ -38,7 +38,7 @@ pub struct Penalties {
 }
 
 impl Penalties {
-    /// P2 is never less than this, however strong the edge: half way from P1 to P2.
+    /// P2 is never less than this, however strong the edge: a quarter of the way from P1 to P2.
     pub const fn least_p2(self) -> u8 {
         self.p1 + (self.p2 - self.p1) / 4
     }
@@ -60,15 +60,11 @@ impl<S: Simd> PenaltyLanes<S> {
     /// term by w is scaling P1 and P2 by 1/w. `reciprocals` holds 255/w of each
     /// pixel, and nothing where the weight is off.
     #[inline(always)]
-    pub fn new(simd: S, penalties: Penalties, reciprocals: Option<&[u8; LANES]>) -> Self {
-        let scaled = |penalty: u8| match reciprocals {
-            None => u8x32::splat(simd, penalty),
-            Some(q) => u8x32::from_fn(simd, |i| ((penalty as u16 * q[i] as u16 + 127) / 255) as u8),
-        };
+    pub fn new(simd: S, penalties: Penalties, reciprocals: Option<&Block>) -> Self {
         Self {
-            p1: scaled(penalties.p1),
-            p2: scaled(penalties.p2),
-            least: scaled(penalties.least_p2()),
+            p1: scaled(simd, penalties.p1, reciprocals),
+            p2: scaled(simd, penalties.p2, reciprocals),
+            least: scaled(simd, penalties.least_p2(), reciprocals),
         }
     }
 
@@ -77,4 +73,14 @@ impl<S: Simd> PenaltyLanes<S> {
     pub fn p2_across(&self, step: u8x32<S>) -> u8x32<S> {
         self.p2.saturating_sub(step).max(self.least)
     }
+}
+
+#[inline(always)]
+fn scaled<S: Simd>(simd: S, penalty: u8, reciprocals: Option<&Block>) -> u8x32<S> {
+    let Some(reciprocals) = reciprocals else { return u8x32::splat(simd, penalty) };
+    let mut out = [0; LANES];
+    for (out, &q) in out.iter_mut().zip(reciprocals) {
+        *out = ((penalty as u16 * q as u16 + 127) / 255) as u8;
+    }
+    load_block(simd, &out)
 }

@@ -4,8 +4,8 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use crate::image::Image;
-use crate::simd::prelude::*;
-use crate::simd::{LANES, Level, Simd, dispatch, u8x32};
+use crate::simd::{Block, LANES, Level, Simd, dispatch, load_block};
+use crate::stage::stereo::block::{self, Measure};
 use crate::stage::stereo::census::Census;
 use crate::stage::stereo::cost::Penalties;
 use crate::stage::stereo::horizontal::Horizontal;
@@ -20,14 +20,25 @@ use crate::stage::stereo::{Matches, NO_MATCH};
 pub struct Settings {
     /// P1 and P2.
     pub penalties: Penalties,
-    /// With the four diagonal paths.
-    pub diagonals: bool,
+    /// How costs are gathered.
+    pub method: Method,
     /// Rows above and below a band that its paths come from.
     pub context: usize,
     /// Percentage by which the best cost must beat the second best.
     pub uniqueness_ratio: u32,
     /// Disparities searched.
     pub search: Range<usize>,
+}
+
+/// How costs are gathered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Along eight paths.
+    EightPaths,
+    /// Along the four paths parallel to the image axes.
+    FourPaths,
+    /// Over a block.
+    Block(Measure),
 }
 
 /// What is matched.
@@ -206,38 +217,86 @@ impl Scratch {
         });
         let (left, right, seeds) = (&self.left, &self.right, seeds.as_ref());
         let penalties = settings.penalties;
-        self.horizontal.run(simd, &shape, penalties, left, right, seeds, &mut self.volume);
         let volume = &mut self.volume;
-        let right_winner = &mut self.right_winner;
-        let mut finish =
-            |k: usize, y: usize, costs: &[crate::simd::Block], floors: &[u16; LANES]| {
-                let x = run.x0 + k * LANES;
-                let inside = (size.width - x).min(LANES);
-                let outside = u8x32::from_fn(simd, |i| if i < inside { 0 } else { 255 });
-                let tile = &shape.tiles[k];
-                right_winner.vote(simd, (x, y), tile.lo, costs, outside);
-                let found = winners(simd, costs, tile.lo, floors, settings.uniqueness_ratio);
-                let at = y * size.width + x;
-                let left = &mut rows.left[at..at + inside];
-                let evidence = &mut rows.evidence[at..at + inside];
-                left.copy_from_slice(&found.disparity[..inside]);
-                evidence.copy_from_slice(&found.evidence[..inside]);
-                if let Some(mask) = views.mask {
-                    let mask = &mask.row(band.y0 + y)[x..x + inside];
-                    for ((d, e), &m) in left.iter_mut().zip(evidence).zip(mask) {
-                        if m == 0 {
-                            (*d, *e) = (NO_MATCH, 0);
-                        }
+        let mut finish = Finish {
+            views,
+            shape: &shape,
+            x0: run.x0,
+            y0: band.y0,
+            uniqueness_ratio: settings.uniqueness_ratio,
+            right: &mut self.right_winner,
+            left: &mut *rows.left,
+            evidence: &mut *rows.evidence,
+        };
+        let h = &mut self.horizontal;
+        let v = &mut self.vertical;
+        match settings.method {
+            Method::EightPaths => {
+                h.run(simd, &shape, penalties, left, right, seeds, volume);
+                v.down::<S, true>(simd, &shape, penalties, left, right, seeds, volume);
+                v.up::<S, true>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+            }
+            Method::FourPaths => {
+                h.run(simd, &shape, penalties, left, right, seeds, volume);
+                v.down::<S, false>(simd, &shape, penalties, left, right, seeds, volume);
+                v.up::<S, false>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+            }
+            Method::Block(measure) => {
+                block::run(simd, measure, &shape, left, right, volume);
+                for y in 0..shape.rows {
+                    for k in 0..shape.tiles.len() {
+                        let floors = *volume.floor_mut(k, y);
+                        finish.row(simd, k, y, volume.row_mut(k, y), &floors);
                     }
                 }
-            };
-        let v = &mut self.vertical;
-        if settings.diagonals {
-            v.down::<S, true>(simd, &shape, penalties, left, right, seeds, volume);
-            v.up::<S, true>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
-        } else {
-            v.down::<S, false>(simd, &shape, penalties, left, right, seeds, volume);
-            v.up::<S, false>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+            }
+        }
+    }
+}
+
+/// Where finished sums go.
+pub struct Finish<'a> {
+    views: &'a Views<'a>,
+    shape: &'a RunShape<'a>,
+    x0: usize,
+    y0: usize,
+    uniqueness_ratio: u32,
+    right: &'a mut RightWinner,
+    left: &'a mut [i16],
+    evidence: &'a mut [u8],
+}
+
+impl Finish<'_> {
+    /// Takes the sums of row `y` of tile `k`.
+    #[inline(always)]
+    pub fn row<S: Simd>(
+        &mut self,
+        simd: S,
+        k: usize,
+        y: usize,
+        costs: &[Block],
+        floors: &[u16; LANES],
+    ) {
+        let width = self.views.left.width();
+        let x = self.x0 + k * LANES;
+        let inside = (width - x).min(LANES);
+        let mut outside = [255; LANES];
+        outside[..inside].fill(0);
+        let lo = self.shape.tiles[k].lo;
+        self.right.vote(simd, (x, y), lo, costs, load_block(simd, &outside));
+        let found = winners(simd, costs, lo, floors, self.uniqueness_ratio);
+        let at = y * width + x;
+        let left = &mut self.left[at..at + inside];
+        let evidence = &mut self.evidence[at..at + inside];
+        left.copy_from_slice(&found.disparity[..inside]);
+        evidence.copy_from_slice(&found.evidence[..inside]);
+        if let Some(mask) = self.views.mask {
+            let mask = &mask.row(self.y0 + y)[x..x + inside];
+            for ((d, e), &m) in left.iter_mut().zip(evidence).zip(mask) {
+                if m == 0 {
+                    (*d, *e) = (NO_MATCH, 0);
+                }
+            }
         }
     }
 }

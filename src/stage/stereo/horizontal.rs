@@ -51,7 +51,6 @@ impl Horizontal {
     /// Turns rows into columns.
     #[inline(always)]
     fn prepare<S: Simd>(&mut self, simd: S, shape: &RunShape<'_>, left: &Census, right: &Census) {
-        let rows = |i: usize| shape.context_above + i.min(shape.rows - 1);
         self.left.resize(shape.width() * PLANES, [0; LANES]);
         self.right.resize(right.stride() * PLANES, [0; LANES]);
         self.gray.resize(shape.width(), [0; LANES]);
@@ -62,7 +61,7 @@ impl Horizontal {
                     let mut block = [[0; LANES]; LANES];
                     for (i, lanes) in block.iter_mut().enumerate() {
                         let at = plane * census.stride() + x;
-                        lanes.copy_from_slice(&census.planes(rows(i))[at..at + LANES]);
+                        lanes.copy_from_slice(&census.planes(shape.row(i))[at..at + LANES]);
                     }
                     let columns = transpose(simd, &block);
                     for (i, column) in columns.into_iter().enumerate() {
@@ -74,7 +73,7 @@ impl Horizontal {
         for x in (0..shape.width()).step_by(LANES) {
             let mut block = [[0; LANES]; LANES];
             for (i, lanes) in block.iter_mut().enumerate() {
-                lanes.copy_from_slice(&left.gray(rows(i))[LANES + x..2 * LANES + x]);
+                lanes.copy_from_slice(&left.gray(shape.row(i))[LANES + x..2 * LANES + x]);
             }
             for (i, column) in transpose(simd, &block).into_iter().enumerate() {
                 column.store_array(&mut self.gray[x + i]);
@@ -100,7 +99,7 @@ impl Horizontal {
 
     #[inline(always)]
     fn left_at<S: Simd>(&self, simd: S, x: usize) -> Descriptors<S> {
-        std::array::from_fn(|k| load_block(simd, &self.left[x * PLANES + k]))
+        load_descriptors(simd, &self.left[x * PLANES..])
     }
 
     /// One column of one path: `state` moves on from the previous column.
@@ -116,17 +115,16 @@ impl Horizontal {
         p1: u8x32<S>,
         p2: u8x32<S>,
     ) -> u8x32<S> {
-        let before = |block: &Block| load_block(simd, block).saturating_sub(floor).min(p2);
         let n = state.len() - 2;
-        let mut smaller = before(&state[0]);
-        let mut same = before(&state[1]);
+        let mut smaller = entering(simd, &state[0], floor, p2);
+        let mut same = entering(simd, &state[1], floor, p2);
         let mut least = u8x32::splat(simd, 255);
         // Disparities grow to the left in the right image.
         let right = right[..n * PLANES].as_chunks::<PLANES>().0;
         for i in 0..n {
-            let larger = before(&state[i + 2]);
+            let larger = entering(simd, &state[i + 2], floor, p2);
             let descriptor = &right[n - 1 - i];
-            let right: Descriptors<S> = std::array::from_fn(|k| load_block(simd, &descriptor[k]));
+            let right = load_descriptors(simd, descriptor);
             let cost = hamming(left, &right) + same.min(smaller.min(larger) + p1);
             cost.store_array(&mut state[i + 1]);
             least = least.min(cost);
@@ -249,4 +247,21 @@ impl Horizontal {
             }
         }
     }
+}
+
+#[inline(always)]
+fn load_descriptors<S: Simd>(simd: S, blocks: &[Block]) -> Descriptors<S> {
+    let blocks = &blocks[..PLANES];
+    [
+        load_block(simd, &blocks[0]),
+        load_block(simd, &blocks[1]),
+        load_block(simd, &blocks[2]),
+        load_block(simd, &blocks[3]),
+    ]
+}
+
+/// What the previous column's path cost adds: less its floor, and at most P2.
+#[inline(always)]
+fn entering<S: Simd>(simd: S, block: &Block, floor: u8x32<S>, p2: u8x32<S>) -> u8x32<S> {
+    load_block(simd, block).saturating_sub(floor).min(p2)
 }

@@ -4,6 +4,7 @@ use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, abs_diff, load, load_block, store, u8x32};
 use crate::stage::stereo::census::Census;
 use crate::stage::stereo::cost::{Penalties, PenaltyLanes, descriptors, hamming};
+use crate::stage::stereo::engine::Finish;
 use crate::stage::stereo::plan::Tile;
 use crate::stage::stereo::volume::{RunShape, Seeds, Volume};
 
@@ -98,7 +99,7 @@ impl Vertical {
         right: &Census,
         seeds: Option<&Seeds<'_>>,
         volume: &mut Volume,
-        mut finish: impl FnMut(usize, usize, &[Block], &[u16; LANES]),
+        finish: &mut Finish<'_>,
     ) {
         self.reset::<DIAGONALS>(shape);
         let end = shape.context_above + shape.rows + shape.context_below;
@@ -121,7 +122,7 @@ impl Vertical {
                 }
                 add_floors(volume.floor_mut(k, y), floor);
                 let floors = *volume.floor_mut(k, y);
-                finish(k, y, volume.row_mut(k, y), &floors);
+                finish.row(simd, k, y, volume.row_mut(k, y), &floors);
             }
             self.turn();
         }
@@ -200,7 +201,6 @@ impl Vertical {
         let p1 = lanes.p1;
         let gray = load(simd, left.gray(step.row), LANES + x);
         let from = left.gray(step.from);
-        let p2_at = |at: usize| lanes.p2_across(abs_diff(gray, load(simd, from, at)));
 
         let l = descriptors(simd, left.planes(step.row), left.stride(), x);
         let right_row = right.planes(step.row);
@@ -210,11 +210,9 @@ impl Vertical {
 
         let s_state = &mut self.straight.state[..];
         let s_floor = load(simd, &self.straight.floor, centre);
-        let s_p2 = p2_at(LANES + x);
-        let s_before =
-            |state: &[u8], at: usize| load(simd, state, at).saturating_sub(s_floor).min(s_p2);
-        let mut s_smaller = s_before(s_state, base - stride);
-        let mut s_same = s_before(s_state, base);
+        let s_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, LANES + x)));
+        let mut s_smaller = entering(simd, s_state, base - stride, s_floor, s_p2);
+        let mut s_same = entering(simd, s_state, base, s_floor, s_p2);
         let mut s_least = u8x32::splat(simd, 255);
 
         if !DIAGONALS {
@@ -222,7 +220,7 @@ impl Vertical {
                 let at = base + i * stride;
                 let r = descriptors(simd, right_row, right.stride(), right_first - i);
                 let cost = hamming(&l, &r);
-                let s_larger = s_before(s_state, at + stride);
+                let s_larger = entering(simd, s_state, at + stride, s_floor, s_p2);
                 let s = cost + s_same.min(s_smaller.min(s_larger) + p1);
                 store(s_state, at, s);
                 s_least = s_least.min(s);
@@ -237,21 +235,17 @@ impl Vertical {
         let [l_prev, l_next] = &mut self.from_left;
         let (l_prev_state, l_next_state) = (&l_prev.state[..], &mut l_next.state[..]);
         let l_floor = load(simd, &l_prev.floor, centre - 1);
-        let l_p2 = p2_at(LANES + x - 1);
-        let l_before =
-            |at: usize| load(simd, l_prev_state, at - 1).saturating_sub(l_floor).min(l_p2);
-        let mut l_smaller = l_before(base - stride);
-        let mut l_same = l_before(base);
+        let l_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, LANES + x - 1)));
+        let mut l_smaller = entering(simd, l_prev_state, base - stride - 1, l_floor, l_p2);
+        let mut l_same = entering(simd, l_prev_state, base - 1, l_floor, l_p2);
         let mut l_least = u8x32::splat(simd, 255);
 
         let [r_prev, r_next] = &mut self.from_right;
         let (r_prev_state, r_next_state) = (&r_prev.state[..], &mut r_next.state[..]);
         let r_floor = load(simd, &r_prev.floor, centre + 1);
-        let r_p2 = p2_at(LANES + x + 1);
-        let r_before =
-            |at: usize| load(simd, r_prev_state, at + 1).saturating_sub(r_floor).min(r_p2);
-        let mut r_smaller = r_before(base - stride);
-        let mut r_same = r_before(base);
+        let r_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, LANES + x + 1)));
+        let mut r_smaller = entering(simd, r_prev_state, base - stride + 1, r_floor, r_p2);
+        let mut r_same = entering(simd, r_prev_state, base + 1, r_floor, r_p2);
         let mut r_least = u8x32::splat(simd, 255);
 
         for (i, sum) in sums.iter_mut().enumerate() {
@@ -259,21 +253,21 @@ impl Vertical {
             let r = descriptors(simd, right_row, right.stride(), right_first - i);
             let cost = hamming(&l, &r);
 
-            let s_larger = s_before(s_state, at + stride);
+            let s_larger = entering(simd, s_state, at + stride, s_floor, s_p2);
             let s = cost + s_same.min(s_smaller.min(s_larger) + p1);
             store(s_state, at, s);
             s_least = s_least.min(s);
             s_smaller = s_same;
             s_same = s_larger;
 
-            let l_larger = l_before(at + stride);
+            let l_larger = entering(simd, l_prev_state, at + stride - 1, l_floor, l_p2);
             let from_left = cost + l_same.min(l_smaller.min(l_larger) + p1);
             store(l_next_state, at, from_left);
             l_least = l_least.min(from_left);
             l_smaller = l_same;
             l_same = l_larger;
 
-            let r_larger = r_before(at + stride);
+            let r_larger = entering(simd, r_prev_state, at + stride + 1, r_floor, r_p2);
             let from_right = cost + r_same.min(r_smaller.min(r_larger) + p1);
             store(r_next_state, at, from_right);
             r_least = r_least.min(from_right);
@@ -294,4 +288,10 @@ fn add_floors<S: Simd>(floors: &mut [u16; LANES], floor: u8x32<S>) {
     for (out, value) in floors.iter_mut().zip(floor.to_array()) {
         *out += value as u16;
     }
+}
+
+/// What the previous row's path cost adds: less its floor, and at most P2.
+#[inline(always)]
+fn entering<S: Simd>(simd: S, state: &[u8], at: usize, floor: u8x32<S>, p2: u8x32<S>) -> u8x32<S> {
+    load(simd, state, at).saturating_sub(floor).min(p2)
 }

@@ -51,6 +51,12 @@ impl RunShape<'_> {
         self.tiles.len() * LANES
     }
 
+    /// Row, counted with the context, of lane `i`; lanes beyond the band repeat its last row.
+    #[inline(always)]
+    pub fn row(&self, i: usize) -> usize {
+        self.context_above + i.min(self.rows - 1)
+    }
+
     /// Disparities from the smallest to the largest.
     #[inline(always)]
     pub const fn range(&self) -> usize {
