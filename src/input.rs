@@ -2,6 +2,7 @@
 
 pub mod bag;
 pub mod live;
+pub mod synthetic;
 
 use std::collections::BTreeMap;
 
