@@ -6,6 +6,8 @@ mod it {
     mod bag;
     mod depth;
     #[cfg(feature = "tool")]
+    mod interop;
+    #[cfg(feature = "tool")]
     mod live;
     #[cfg(feature = "tool")]
     mod metric;

@@ -5,6 +5,7 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
@@ -78,6 +79,15 @@ pub(crate) fn disconnect_rosout() {
     drop(old);
 }
 
+/// Set once a node leaves the graph: what the transport then says about its
+/// vanished counterparts and groups is of no use to anybody.
+static LEAVING: AtomicBool = AtomicBool::new(false);
+
+/// Shows nothing of the transport libraries while a node takes itself down.
+pub(crate) fn mute_transport(mute: bool) {
+    LEAVING.store(mute, Ordering::Relaxed);
+}
+
 struct RosLayer {
     logger: String,
     stderr: bool,
@@ -110,7 +120,7 @@ impl<S: Subscriber> Layer<S> for RosLayer {
             if self.stderr {
                 write_line(level, &self.logger, &line.text);
             }
-        } else if self.stderr {
+        } else if self.stderr && !LEAVING.load(Ordering::Relaxed) {
             let target = line.target.as_deref().unwrap_or_else(|| metadata.target());
             let admitted =
                 self.foreign.lock().unwrap_or_else(PoisonError::into_inner).admit(Instant::now());

@@ -269,8 +269,15 @@ impl NodeRuntime {
         if self.rosout {
             log::disconnect_rosout();
         }
+        log::mute_transport(true);
         self.stop.clear();
         self.graph = None;
+        let stopped = self.wait_for_threads();
+        log::mute_transport(false);
+        stopped
+    }
+
+    fn wait_for_threads(&mut self) -> bool {
         let deadline = Instant::now() + STOP_PATIENCE;
         while self.running > 0 {
             let left = deadline.saturating_duration_since(Instant::now());

@@ -161,11 +161,12 @@ impl Reporter {
         let mut calibration = Draft::new();
         match &*lock(&status.calibration) {
             None => {
+                // Before the first image there is nothing to calibrate.
                 let missing = match state.as_ref().map(|s| s.has_info) {
-                    Some([true, true]) => None,
-                    Some([false, true]) => Some("no left camera info yet"),
-                    Some([true, false]) => Some("no right camera info yet"),
-                    _ => Some("no camera info yet"),
+                    None | Some([true, true]) => None,
+                    Some([false, true]) => Some("images come, but no left camera info"),
+                    Some([true, false]) => Some("images come, but no right camera info"),
+                    Some([false, false]) => Some("images come, but no camera info"),
                 };
                 if let Some(missing) = missing {
                     calibration.say(DiagnosticStatus::WARN, missing);
