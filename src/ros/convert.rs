@@ -17,6 +17,7 @@ mod bayer;
 mod calibration;
 mod compressed;
 mod dense;
+mod encoding;
 mod fit;
 mod picture;
 mod region;
@@ -30,8 +31,9 @@ pub use dense::{
     confidence_image, depth_camera_info, depth_image, disparities, disparity_image, float_image,
     floats, label_image, labels, picture_image, rgb_image, saliency_image,
 };
+pub use encoding::ENCODINGS;
 pub use fit::{REGIONS_LIMIT, Reduction, fit_regions};
-pub use picture::{ENCODINGS, picture, picture_into};
+pub use picture::{picture, picture_into};
 pub use region::region_array;
 
 use crate::image::{Image, Picture, Size};
