@@ -6,6 +6,7 @@ use crate::perception::{Clock, Perception, Stage, StageTimes, StereoFrame, View}
 use crate::simd::Level;
 use crate::stage::coarse::{Coarse, CoarseDisparity};
 use crate::stage::depth::Depth;
+use crate::stage::ground::Ground;
 use crate::stage::preprocess::Preprocess;
 use crate::stage::refine::Refine;
 use crate::stage::regions::{RegionSource, Regions};
@@ -140,6 +141,7 @@ impl Pipeline {
             confidence: &out.confidence,
             depth: &out.depth,
             rig: &out.rig,
+            plane: self.saliency.ground().and_then(Ground::plane),
         };
         self.regions.run(&source, &mut out.labels, &mut out.regions, &mut out.rejections);
         lap.mark(&mut out.times, Stage::Regions);

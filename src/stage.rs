@@ -2,10 +2,12 @@
 
 pub mod coarse;
 pub mod depth;
+pub mod ground;
 pub mod preprocess;
 pub mod refine;
 pub mod regions;
 pub mod roi;
 pub mod saliency;
+pub mod standing;
 pub mod stereo;
 pub mod track;

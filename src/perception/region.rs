@@ -147,6 +147,8 @@ pub struct Rejections {
     pub low_confidence: u32,
     /// Disparities that do not form one object.
     pub inconsistent_depth: u32,
+    /// Large enough, but nothing carries it: the crown of a tree, a bridge.
+    pub floating: u32,
     /// Seen in too few of the last frames.
     pub unstable: u32,
     /// Beyond `regions.max_count`.
@@ -159,6 +161,7 @@ impl Rejections {
         self.small_area
             + self.low_confidence
             + self.inconsistent_depth
+            + self.floating
             + self.unstable
             + self.over_count
     }

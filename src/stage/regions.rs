@@ -4,14 +4,17 @@ pub mod components;
 pub mod contour;
 pub mod measure;
 pub mod union_find;
+pub mod upright;
 
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{Region, RegionList, Rejections, RoiMask};
+use crate::stage::ground::Plane;
 use components::{Candidates, Components};
 use contour::Contour;
 use measure::{Evidence, Measure};
+use upright::Upright;
 
 /// Least share of a region's pixels that must have a disparity.
 const MIN_VALID_FRACTION: f32 = 0.1;
@@ -40,6 +43,9 @@ pub struct RegionSource<'a> {
     pub depth: &'a Image<f32>,
     /// Calibration of these images.
     pub rig: &'a StereoRig,
+    /// The ground, where one is known: what stands on it becomes a region.
+    /// Without it, connected pixels of one depth do.
+    pub plane: Option<&'a Plane>,
 }
 
 /// The region former.
@@ -49,6 +55,7 @@ pub struct Regions {
     max_count: usize,
     contour_tolerance: f32,
     components: Components,
+    upright: Upright,
     candidates: Candidates,
     measure: Measure,
     contour: Contour,
@@ -63,6 +70,7 @@ impl Regions {
             max_count: usize::try_from(config.regions.max_count).unwrap_or(1),
             contour_tolerance: config.regions.contour_tolerance as f32,
             components: Components::default(),
+            upright: Upright::default(),
             candidates: Candidates::default(),
             measure: Measure::default(),
             contour: Contour::default(),
@@ -79,7 +87,12 @@ impl Regions {
     ) {
         regions.clear();
         *rejections = Rejections::default();
-        self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
+        if let Some(plane) = source.plane {
+            rejections.floating =
+                self.upright.run(plane, source, self.min_area, &mut self.candidates);
+        } else {
+            self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
+        }
         for (index, bounds) in self.candidates.boxes.iter().enumerate() {
             if bounds.area < self.min_area {
                 rejections.small_area += 1;

@@ -4,16 +4,20 @@
 //! quarter-size view of the left image is made once per frame and shared by
 //! every cue. The map is smoothed over time and brought to full size at the end.
 
+pub mod barrier;
+pub mod boundary;
 mod cells;
 pub mod color;
 pub mod depth;
 pub mod frequency_tuned;
 pub mod integral;
 pub mod intensity;
+pub mod lateral;
 pub mod motion;
 pub mod normalize;
 pub mod orientation;
 pub mod paper;
+pub mod scene;
 pub mod spectral_residual;
 mod upsample;
 
@@ -26,10 +30,12 @@ use crate::image::{Image, Size};
 use crate::perception::View;
 use crate::simd::Level;
 use crate::stage::coarse::{CELL, CoarseDisparity};
+use crate::stage::ground::Ground;
 use crate::stamp::Stamp;
 
 use frequency_tuned::FrequencyTuned;
 use paper::Paper;
+use scene::SceneSaliency;
 use spectral_residual::SpectralResidual;
 
 /// What the stage is given.
@@ -111,6 +117,7 @@ pub trait Cue {
 
 /// One way to make the attention map.
 enum Mode {
+    Scene(Box<SceneSaliency>),
     Paper(Box<Paper>),
     FrequencyTuned(Box<FrequencyTuned>),
     SpectralResidual(Box<SpectralResidual>),
@@ -129,10 +136,8 @@ impl Saliency {
     /// The stage for views of `size`.
     pub fn new(config: &Config, size: Size, _level: Level) -> Self {
         let mode = match config.saliency.mode {
-            // Geometry first goes into an arm of its own: Mode::Scene(SceneSaliency).
-            SaliencyMode::Scene | SaliencyMode::Paper => {
-                Mode::Paper(Box::new(Paper::new(&config.saliency.paper)))
-            }
+            SaliencyMode::Scene => Mode::Scene(Box::default()),
+            SaliencyMode::Paper => Mode::Paper(Box::new(Paper::new(&config.saliency.paper))),
             SaliencyMode::FrequencyTuned => Mode::FrequencyTuned(Box::default()),
             SaliencyMode::SpectralResidual => Mode::SpectralResidual(Box::default()),
             SaliencyMode::FullFrame => Mode::FullFrame,
@@ -142,6 +147,14 @@ impl Saliency {
             mode,
             smoothing: config.saliency.temporal_smoothing as f32,
             cells: View::default(),
+        }
+    }
+
+    /// The ground plane of the last frame, for the mode that looks for one.
+    pub fn ground(&self) -> Option<&Ground> {
+        match &self.mode {
+            Mode::Scene(mode) => Some(mode.ground()),
+            _ => None,
         }
     }
 
@@ -175,6 +188,7 @@ impl Saliency {
         // The flow that carries the previous map to this frame, for the modes that know one.
         let flow: Option<&Image<[f32; 2]>> = None;
         match &mut self.mode {
+            Mode::Scene(mode) => mode.run(&scene, attention),
             Mode::Paper(paper) => paper.run(&scene, attention),
             Mode::FrequencyTuned(frequency_tuned) => frequency_tuned.run(&scene, attention),
             Mode::SpectralResidual(residual) => residual.run(&scene, attention),

@@ -290,6 +290,7 @@ impl Boxes {
             confidence: &self.confidence,
             depth: &depth,
             rig: &rig,
+            plane: None,
         };
         let mut out = (Image::default(), RegionList::default(), Rejections::default());
         Regions::new(config, self.size).run(&source, &mut out.0, &mut out.1, &mut out.2);
@@ -413,6 +414,7 @@ fn each_refusal_has_its_reason() {
         small_area: 1,
         low_confidence: 2,
         inconsistent_depth: 1,
+        floating: 0,
         unstable: 0,
         over_count: 1,
     };

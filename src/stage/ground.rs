@@ -1,0 +1,321 @@
+//! The plane that things stand on.
+
+use crate::camera::StereoRig;
+use crate::image::{Image, Size};
+use crate::stage::coarse::CELL;
+
+/// Share of the measured cells below the horizon that must lie on a plane to begin with.
+const ACQUIRE: f32 = 0.30;
+/// The same to go on with the last plane.
+const KEEP: f32 = 0.18;
+/// Frames without support after which the last plane is given up.
+const PATIENCE: u32 = 10;
+/// Share of the new plane in the running one.
+const RENEWAL: f32 = 0.2;
+/// Planes tried per frame when there is none yet, and when there is one.
+const TRIALS: usize = 160;
+const TRIALS_NEAR: usize = 32;
+/// Most cells that vote.
+const MAX_VOTERS: usize = 1600;
+/// Reweighted least-squares steps.
+const STEPS: usize = 5;
+/// Least cosine between the plane's normal and the image's vertical: a floor
+/// seen from 70 degrees above still counts, a wall ahead does not.
+const MIN_UPRIGHT: f32 = 0.3;
+/// Largest sine of the camera's roll.
+const MAX_ROLL: f32 = 0.35;
+/// Camera heights in metres that a plane may have.
+const HEIGHTS_M: std::ops::RangeInclusive<f32> = 0.05..=20.0;
+
+/// A plane in disparity space: d = a v + b u + c, with u, v in full-size pixels
+/// and d in pixels (`cx_l - cx_r` subtracted).
+///
+/// In space it is n · P = f B with n = (b fx, a fy, a cy + b cx + c), because
+/// d = f B / Z and u = fx X / Z + cx, v = fy Y / Z + cy. The height of a point
+/// above it is therefore (f B / |n|) (d − d_plane) / d.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Change of disparity per row.
+    pub a: f32,
+    /// Change of disparity per column.
+    pub b: f32,
+    /// Disparity at the origin of the image.
+    pub c: f32,
+    /// Height of the camera above the plane, metres.
+    pub camera_height_m: f32,
+    /// Median distance of what was seen of the plane along the optical axis, metres.
+    pub distance_m: f32,
+}
+
+impl Plane {
+    /// Disparity of the plane at pixel (u, v).
+    #[inline]
+    pub fn disparity(&self, u: f32, v: f32) -> f32 {
+        self.a * v + self.b * u + self.c
+    }
+
+    /// Height in metres above the plane of a point at pixel (u, v) with disparity `d` > 0.
+    #[inline]
+    pub fn height(&self, u: f32, v: f32, d: f32) -> f32 {
+        self.camera_height_m * (d - self.disparity(u, v)) / d
+    }
+
+    /// Size of the scene against a road's, 0.03..=1: every length that has to
+    /// do with the things on the plane is given for a plane seen at 10 m and
+    /// multiplied by this.
+    pub fn scale(&self) -> f32 {
+        (self.distance_m / 10.0).clamp(0.03, 1.0)
+    }
+}
+
+/// Whether there is a plane to reckon with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum GroundState {
+    /// No plane: nothing can be said about heights.
+    #[default]
+    None = 0,
+    /// A plane was measured in this frame.
+    Measured = 1,
+    /// The last plane is used; this frame did not support one.
+    Held = 2,
+}
+
+impl GroundState {
+    /// Name in reports and diagnostics.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "no plane",
+            Self::Measured => "plane",
+            Self::Held => "plane held",
+        }
+    }
+}
+
+/// A measured cell: pixel and disparity.
+#[derive(Clone, Copy, Debug)]
+struct Vote {
+    u: f32,
+    v: f32,
+    d: f32,
+}
+
+/// The estimator of the ground plane, with its memory of the last one.
+#[derive(Debug, Default)]
+pub struct Ground {
+    plane: Option<Plane>,
+    state: GroundState,
+    failures: u32,
+    votes: Vec<Vote>,
+    depths: Vec<f32>,
+}
+
+/// Largest distance of a cell from the plane it belongs to, in pixels.
+#[inline]
+fn tolerance(disparity: f32) -> f32 {
+    (0.06 * disparity).max(0.5)
+}
+
+impl Ground {
+    /// Forgets the last plane.
+    pub fn reset(&mut self) {
+        self.plane = None;
+        self.state = GroundState::None;
+        self.failures = 0;
+    }
+
+    /// The plane in use.
+    pub fn plane(&self) -> Option<&Plane> {
+        self.plane.as_ref()
+    }
+
+    /// Where it comes from.
+    pub fn state(&self) -> GroundState {
+        self.state
+    }
+
+    /// Looks for the plane in the checked disparity of each cell (full-size
+    /// pixels, `x_l - x_r`; NaN where there is none).
+    ///
+    /// Consensus of triples of cells (Fischler and Bolles 1981; the triples
+    /// are a fixed sequence), nearest to the last plane first, then iteratively
+    /// reweighted least squares. What lies below a candidate counts against
+    /// it: nothing is under the ground.
+    pub fn run(&mut self, checked: &Image<f32>, rig: &StereoRig) {
+        self.collect(checked, rig);
+        let found = self.search(rig).and_then(|plane| self.refine(plane, rig));
+        let threshold = if self.plane.is_some() { KEEP } else { ACQUIRE };
+        let accepted = found.filter(|(_, support)| *support >= threshold).map(|(plane, _)| plane);
+        match (accepted, &mut self.plane) {
+            (Some(new), Some(old)) => {
+                // A camera that nods moves the plane; an EMA takes the noise
+                // out, but a plane that is elsewhere is taken as it is.
+                let near = (new.camera_height_m / old.camera_height_m - 1.0).abs() < 0.25;
+                let share = if near { RENEWAL.max(0.5) } else { 1.0 };
+                *old = mix(old, &new, share, rig);
+                (self.state, self.failures) = (GroundState::Measured, 0);
+            }
+            (Some(new), none) => {
+                *none = Some(new);
+                (self.state, self.failures) = (GroundState::Measured, 0);
+            }
+            (None, Some(_)) if self.failures < PATIENCE => {
+                self.failures += 1;
+                self.state = GroundState::Held;
+            }
+            (None, _) => self.reset(),
+        }
+    }
+
+    fn collect(&mut self, checked: &Image<f32>, rig: &StereoRig) {
+        self.votes.clear();
+        let (offset, cell) = (rig.disparity_offset() as f32, CELL as f32);
+        let step = (checked.size().area() / MAX_VOTERS).max(1) | 1;
+        let width = checked.width();
+        let mut i = 0;
+        while i < checked.pixels().len() {
+            let d = checked.pixels()[i] - offset;
+            if d > 0.75 {
+                let (u, v) = ((i % width) as f32, (i / width) as f32);
+                self.votes.push(Vote { u: u * cell + 1.5, v: v * cell + 1.5, d });
+            }
+            i += step;
+        }
+    }
+
+    /// The best of the last plane and of planes through triples of votes.
+    fn search(&self, rig: &StereoRig) -> Option<Plane> {
+        let n = self.votes.len();
+        if n < 30 {
+            return None;
+        }
+        let mut best = (0.0_f32, None);
+        let mut consider = |plane: Option<Plane>| {
+            if let Some(plane) = plane {
+                let score = self.score(&plane);
+                if score > best.0 {
+                    best = (score, Some(plane));
+                }
+            }
+        };
+        consider(self.plane);
+        // A fixed sequence (Knuth's MMIX generator): same input, same plane.
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) as usize) % n
+        };
+        let trials = if self.plane.is_some() { TRIALS_NEAR } else { TRIALS };
+        for _ in 0..trials {
+            let (p, q, r) = (self.votes[random()], self.votes[random()], self.votes[random()]);
+            consider(through(p, q, r, rig));
+        }
+        best.1
+    }
+
+    /// Votes on the plane less those below it.
+    fn score(&self, plane: &Plane) -> f32 {
+        let mut score = 0.0;
+        for vote in &self.votes {
+            let at = plane.disparity(vote.u, vote.v);
+            let difference = vote.d - at;
+            let tolerance = tolerance(at);
+            // Far away everything is near the plane: such votes count less.
+            let weight = (at / 8.0).clamp(0.0, 1.0);
+            if difference.abs() < tolerance {
+                score += weight * (1.0 - (difference / tolerance).powi(2));
+            } else if difference < 0.0 && at > 1.0 {
+                score -= 0.7 * weight;
+            }
+        }
+        score
+    }
+
+    /// Least squares over the votes near the plane, reweighted (Tukey), and the
+    /// share of all votes below the horizon that agree in the end.
+    fn refine(&mut self, start: Plane, rig: &StereoRig) -> Option<(Plane, f32)> {
+        let mut plane = start;
+        for _ in 0..STEPS {
+            let mut normal = nalgebra::Matrix3::<f64>::zeros();
+            let mut right = nalgebra::Vector3::<f64>::zeros();
+            for vote in &self.votes {
+                let at = plane.disparity(vote.u, vote.v);
+                let ratio = (vote.d - at) / tolerance(at);
+                if ratio.abs() < 1.0 && at > 0.5 {
+                    // The tolerance grows with disparity: so does the noise.
+                    let weight = f64::from((1.0 - ratio * ratio).powi(2) / tolerance(at));
+                    let row = nalgebra::Vector3::new(f64::from(vote.v), f64::from(vote.u), 1.0);
+                    normal += weight * row * row.transpose();
+                    right += weight * f64::from(vote.d) * row;
+                }
+            }
+            let solution = normal.try_inverse()? * right;
+            plane = plane_of(solution.x as f32, solution.y as f32, solution.z as f32, rig)?;
+        }
+        let (mut on, mut all) = (0.0_f32, 0.0_f32);
+        self.depths.clear();
+        for vote in &self.votes {
+            let at = plane.disparity(vote.u, vote.v);
+            if at <= 2.0 {
+                continue;
+            }
+            all += 1.0;
+            if (vote.d - at).abs() < tolerance(at) {
+                on += 1.0;
+                self.depths.push(rig.depth_scale() as f32 / at);
+            }
+        }
+        if self.depths.len() < 20 {
+            return None;
+        }
+        let middle = self.depths.len() / 2;
+        plane.distance_m = *self.depths.select_nth_unstable_by(middle, f32::total_cmp).1;
+        Some((plane, on / all))
+    }
+}
+
+/// The plane with these coefficients if it may be a ground.
+fn plane_of(a: f32, b: f32, c: f32, rig: &StereoRig) -> Option<Plane> {
+    let (cx, cy) = rig.principal_point();
+    let n =
+        [b * rig.focal_px() as f32, a * rig.focal_y_px() as f32, a * cy as f32 + b * cx as f32 + c];
+    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    let height = rig.depth_scale() as f32 / length;
+    let plausible =
+        n[1] > MIN_UPRIGHT * length && n[0].abs() < MAX_ROLL * n[1] && HEIGHTS_M.contains(&height);
+    plausible.then_some(Plane { a, b, c, camera_height_m: height, distance_m: 10.0 })
+}
+
+fn through(p: Vote, q: Vote, r: Vote, rig: &StereoRig) -> Option<Plane> {
+    let (du1, dv1, dd1) = (q.u - p.u, q.v - p.v, q.d - p.d);
+    let (du2, dv2, dd2) = (r.u - p.u, r.v - p.v, r.d - p.d);
+    let area = dv1 * du2 - dv2 * du1;
+    if area.abs() < 400.0 {
+        return None;
+    }
+    let a = (dd1 * du2 - dd2 * du1) / area;
+    let b = (dv1 * dd2 - dv2 * dd1) / area;
+    plane_of(a, b, p.d - a * p.v - b * p.u, rig)
+}
+
+fn mix(old: &Plane, new: &Plane, share: f32, rig: &StereoRig) -> Plane {
+    let blend = |o: f32, n: f32| o + share * (n - o);
+    let mixed = plane_of(blend(old.a, new.a), blend(old.b, new.b), blend(old.c, new.c), rig);
+    let distance_m = blend(old.distance_m, new.distance_m);
+    // Two grounds have no wall between them, but rounding may say otherwise.
+    mixed.map_or(*new, |plane| Plane { distance_m, ..plane })
+}
+
+/// Centre of a cell in full-size pixels.
+#[inline]
+pub fn cell_centre(x: usize, y: usize) -> (f32, f32) {
+    let half = (CELL as f32 - 1.0) / 2.0;
+    ((x * CELL) as f32 + half, (y * CELL) as f32 + half)
+}
+
+/// Size of the map of cells of an image of `size`.
+pub fn cells(size: Size) -> Size {
+    size.divided_by(CELL)
+}
