@@ -109,7 +109,7 @@ struct Totals {
     frames: u64,
     regions: u64,
     roi_fraction: f64,
-    rejections: [u64; 5],
+    rejections: [u64; 6],
     size: Option<Size>,
     first: Stamp,
     last: Stamp,
@@ -127,9 +127,16 @@ impl Totals {
         self.size = Some(perception.left.gray.size());
         self.regions += perception.regions.len() as u64;
         self.roi_fraction += f64::from(perception.roi.fraction);
-        let Rejections { small_area, low_confidence, inconsistent_depth, unstable, over_count } =
-            perception.rejections;
-        let reasons = [small_area, low_confidence, inconsistent_depth, unstable, over_count];
+        let Rejections {
+            small_area,
+            low_confidence,
+            inconsistent_depth,
+            floating,
+            unstable,
+            over_count,
+        } = perception.rejections;
+        let reasons =
+            [small_area, low_confidence, inconsistent_depth, floating, unstable, over_count];
         for (sum, count) in self.rejections.iter_mut().zip(reasons) {
             *sum += u64::from(count);
         }

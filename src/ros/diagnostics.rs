@@ -67,7 +67,7 @@ pub struct Work {
     /// Sum of the shares of the image that were matched.
     pub roi_fraction: f64,
     /// Candidates refused, summed.
-    pub rejections: [u64; 5],
+    pub rejections: [u64; 6],
 }
 
 /// Totals since the start.
@@ -202,6 +202,7 @@ impl NodeStatus {
             rejections.small_area,
             rejections.low_confidence,
             rejections.inconsistent_depth,
+            rejections.floating,
             rejections.unstable,
             rejections.over_count,
         ];

@@ -214,6 +214,7 @@ fn counters(report: &ReportSink) -> String {
         "smaller than regions.min_area",
         "low confidence or too few matches",
         "inconsistent depth",
+        "not standing on the ground",
         "seen in too few frames",
         "beyond regions.max_count",
     ];

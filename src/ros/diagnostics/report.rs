@@ -262,7 +262,14 @@ fn processing(work: &Work) -> Draft {
     draft.value("total (ms)", format_args!("{:.2}", total / frames));
     draft.value("longest frame (ms)", format_args!("{:.2}", work.longest_ms));
     draft.value("share of the image matched", format_args!("{:.3}", work.roi_fraction / frames));
-    let names = ["small area", "low confidence", "inconsistent depth", "unstable", "over count"];
+    let names = [
+        "small area",
+        "low confidence",
+        "inconsistent depth",
+        "not standing on the ground",
+        "unstable",
+        "over count",
+    ];
     for (name, count) in names.into_iter().zip(work.rejections) {
         draft.value(format!("candidates refused: {name}"), count);
     }
