@@ -42,7 +42,7 @@ pub struct Pipeline {
 impl Pipeline {
     /// The pipeline for pictures of `size` under a valid `config`.
     pub fn new(config: &Config, size: Size, level: Level) -> Self {
-        let preprocess = Preprocess::new(config, size);
+        let preprocess = Preprocess::new(config, size, level);
         let size = preprocess.output_size();
         Self {
             preprocess,

@@ -13,6 +13,7 @@ use crate::camera::StereoRig;
 use crate::config::{Config, Denoise, Illumination};
 use crate::image::{Image, Picture, Size};
 use crate::perception::{Perception, StereoFrame, View};
+use crate::simd::Level;
 
 use denoise::{gaussian3, median3};
 use gradient::gradient;
@@ -27,6 +28,7 @@ use resize::box_mean;
 /// denoise), so that no step makes a difference between them; the colours of
 /// the left view go that way beside them.
 pub struct Preprocess {
+    level: Level,
     size: Size,
     scale: usize,
     rectify: bool,
@@ -48,7 +50,7 @@ struct Calibration {
 
 impl Preprocess {
     /// The stage for pictures of `size`.
-    pub fn new(config: &Config, size: Size) -> Self {
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
         let scale = match config.preprocess.scale {
             2 => 2,
             4 => 4,
@@ -57,14 +59,15 @@ impl Preprocess {
         let denoise = config.preprocess.denoise;
         let scaled = Size::new((size.width / scale).max(1), (size.height / scale).max(1));
         Self {
+            level,
             size: if size.is_empty() { size } else { scaled },
             scale,
             rectify: config.rectify,
             illumination: config.preprocess.illumination,
             calibration: None,
             luma: Image::default(),
-            gray: Chain::new(scale, denoise),
-            rgb: Chain::new(scale, denoise),
+            gray: Chain::new(level, scale, denoise),
+            rgb: Chain::new(level, scale, denoise),
             clahe: Clahe::default(),
         }
     }
@@ -95,7 +98,7 @@ impl Preprocess {
             let gray = match picture {
                 Picture::Gray(gray) => gray,
                 Picture::Rgb(rgb) => {
-                    luma(rgb, &mut self.luma);
+                    luma(self.level, rgb, &mut self.luma);
                     &self.luma
                 }
             };
@@ -120,8 +123,8 @@ impl Preprocess {
             }
             Illumination::Match => match_contrast(&out.left.gray, &mut right.gray),
         }
-        gradient(&out.left.gray, &mut out.left.gradient);
-        gradient(&right.gray, &mut right.gradient);
+        gradient(self.level, &out.left.gray, &mut out.left.gradient);
+        gradient(self.level, &right.gray, &mut right.gradient);
     }
 
     /// Makes maps and scaled rig anew when the calibration has changed. Frames
@@ -150,6 +153,7 @@ impl Preprocess {
 
 /// Rectify, resize, denoise for `C` interleaved channels, with the images in between.
 struct Chain<const C: usize> {
+    level: Level,
     scale: usize,
     denoise: Denoise,
     rectified: Vec<u8>,
@@ -157,8 +161,8 @@ struct Chain<const C: usize> {
 }
 
 impl<const C: usize> Chain<C> {
-    fn new(scale: usize, denoise: Denoise) -> Self {
-        Self { scale, denoise, rectified: Vec::new(), resized: Vec::new() }
+    fn new(level: Level, scale: usize, denoise: Denoise) -> Self {
+        Self { level, scale, denoise, rectified: Vec::new(), resized: Vec::new() }
     }
 
     /// From a picture of rows of `width` pixels to a view of rows of `out_width`.
@@ -182,21 +186,22 @@ impl<const C: usize> Chain<C> {
         }
         if self.scale > 1 {
             if self.denoise == Denoise::None {
-                return shrink::<C>(self.scale, source, width, out, out_width);
+                return shrink::<C>(self.level, self.scale, source, width, out, out_width);
             }
             self.resized.resize(out.len(), 0);
-            shrink::<C>(self.scale, source, width, &mut self.resized, out_width);
+            shrink::<C>(self.level, self.scale, source, width, &mut self.resized, out_width);
             source = &self.resized;
         }
         match self.denoise {
             Denoise::None => out.copy_from_slice(source),
-            Denoise::Median3 => median3::<C>(source, out_width, out),
-            Denoise::Gaussian3 => gaussian3::<C>(source, out_width, out),
+            Denoise::Median3 => median3::<C>(self.level, source, out_width, out),
+            Denoise::Gaussian3 => gaussian3::<C>(self.level, source, out_width, out),
         }
     }
 }
 
 fn shrink<const C: usize>(
+    level: Level,
     scale: usize,
     source: &[u8],
     width: usize,
@@ -204,7 +209,7 @@ fn shrink<const C: usize>(
     out_width: usize,
 ) {
     match scale {
-        2 => box_mean::<C, 2>(source, width, out, out_width),
-        _ => box_mean::<C, 4>(source, width, out, out_width),
+        2 => box_mean::<C, 2>(level, source, width, out, out_width),
+        _ => box_mean::<C, 4>(level, source, width, out, out_width),
     }
 }

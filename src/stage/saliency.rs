@@ -126,6 +126,7 @@ enum Mode {
 
 /// The attention stage.
 pub struct Saliency {
+    level: Level,
     size: Size,
     mode: Mode,
     smoothing: f32,
@@ -134,15 +135,18 @@ pub struct Saliency {
 
 impl Saliency {
     /// The stage for views of `size`.
-    pub fn new(config: &Config, size: Size, _level: Level) -> Self {
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
         let mode = match config.saliency.mode {
             SaliencyMode::Scene => Mode::Scene(Box::default()),
-            SaliencyMode::Paper => Mode::Paper(Box::new(Paper::new(&config.saliency.paper))),
-            SaliencyMode::FrequencyTuned => Mode::FrequencyTuned(Box::default()),
+            SaliencyMode::Paper => Mode::Paper(Box::new(Paper::new(&config.saliency.paper, level))),
+            SaliencyMode::FrequencyTuned => {
+                Mode::FrequencyTuned(Box::new(FrequencyTuned::new(level)))
+            }
             SaliencyMode::SpectralResidual => Mode::SpectralResidual(Box::default()),
             SaliencyMode::FullFrame => Mode::FullFrame,
         };
         Self {
+            level,
             size,
             mode,
             smoothing: config.saliency.temporal_smoothing as f32,
@@ -175,7 +179,7 @@ impl Saliency {
             saliency.fill(1.0);
             return;
         }
-        shrink_view(scene.left, &mut self.cells);
+        shrink_view(self.level, scene.left, &mut self.cells);
         let before = previous.get(cells);
         let scene = AttentionScene {
             stamp: scene.stamp,

@@ -7,6 +7,7 @@ use salient_stereo::camera::{Camera, Distortion, StereoRig};
 use salient_stereo::config::{Config, Denoise, Illumination};
 use salient_stereo::image::{Image, Picture, Size};
 use salient_stereo::perception::{Perception, StereoFrame, View};
+use salient_stereo::simd::{self, Level};
 use salient_stereo::stage::preprocess::Preprocess;
 use salient_stereo::stage::preprocess::denoise::{gaussian3, median3};
 use salient_stereo::stage::preprocess::gradient::gradient;
@@ -53,48 +54,54 @@ fn frame(left: Picture, right: Picture, rig: &Arc<StereoRig>) -> StereoFrame {
     }
 }
 
+/// Every size at every SIMD level.
+fn cases() -> impl Iterator<Item = (Size, Level)> {
+    let sizes = ODD_SIZES.into_iter().chain([Size::new(519, 9), Size::new(256, 4)]);
+    sizes.flat_map(|size| simd::available().into_iter().map(move |level| (size, level)))
+}
+
 #[test]
 fn luma_is_the_weighted_sum_of_bt_601() {
     let rgb = Noise(1).rgb(Size::new(33, 17));
     let mut gray = Image::default();
-    luma(&rgb, &mut gray);
+    luma(simd::detect(), &rgb, &mut gray);
     for (&[r, g, b], &y) in rgb.pixels().iter().zip(gray.pixels()) {
         let exact = 0.299 * f64::from(r) + 0.587 * f64::from(g) + 0.114 * f64::from(b);
         assert!((f64::from(y) - exact).abs() <= 0.9, "{r} {g} {b}: {y}, not {exact}");
     }
     for value in [0, 1, 128, 255] {
-        luma(&Image::filled(Size::new(3, 1), [value; 3]), &mut gray);
+        luma(simd::detect(), &Image::filled(Size::new(3, 1), [value; 3]), &mut gray);
         assert_eq!(gray.pixels(), [value; 3]);
     }
 }
 
 #[test]
 fn gradient_equals_its_definition() {
-    for size in ODD_SIZES {
+    for (size, level) in cases() {
         let gray = Noise(2).gray(size);
         let mut out = Image::default();
-        gradient(&gray, &mut out);
+        gradient(level, &gray, &mut out);
         assert_eq!(out, plain::gradient(&gray), "{size}");
     }
 }
 
 #[test]
 fn noise_filters_equal_their_definitions() {
-    for size in ODD_SIZES {
+    for (size, level) in cases() {
         let (gray, rgb) = (Noise(3).gray(size), Noise(4).rgb(size));
         let mut out = Image::new(size);
-        median3::<1>(gray.pixels(), size.width, out.pixels_mut());
+        median3::<1>(level, gray.pixels(), size.width, out.pixels_mut());
         assert_eq!(out, plain::median3(&gray), "median, {size}");
-        gaussian3::<1>(gray.pixels(), size.width, out.pixels_mut());
+        gaussian3::<1>(level, gray.pixels(), size.width, out.pixels_mut());
         assert_eq!(out, plain::gaussian3(&gray), "gaussian, {size}");
         let mut colors = Image::new(size);
         let (bytes, width) = (rgb.pixels().as_flattened(), size.width);
-        median3::<3>(bytes, width, colors.pixels_mut().as_flattened_mut());
+        median3::<3>(level, bytes, width, colors.pixels_mut().as_flattened_mut());
         for c in 0..3 {
             let expected = plain::median3(&plain::channel(&rgb, c));
             assert_eq!(plain::channel(&colors, c), expected, "median of {c}, {size}");
         }
-        gaussian3::<3>(bytes, width, colors.pixels_mut().as_flattened_mut());
+        gaussian3::<3>(level, bytes, width, colors.pixels_mut().as_flattened_mut());
         for c in 0..3 {
             let expected = plain::gaussian3(&plain::channel(&rgb, c));
             assert_eq!(plain::channel(&colors, c), expected, "gaussian of {c}, {size}");
@@ -104,20 +111,20 @@ fn noise_filters_equal_their_definitions() {
 
 #[test]
 fn area_resize_equals_the_mean_of_its_pixels() {
-    for size in ODD_SIZES.into_iter().chain([Size::new(519, 9), Size::new(256, 4)]) {
+    for (size, level) in cases() {
         let rgb = Noise(5).rgb(size);
         let up = size.divided_by(4);
         let down = Size::new((size.width / 2).max(1), (size.height / 2).max(1));
         let (mut quarter, mut half) = (Image::new(up), Image::new(down));
         let bytes = rgb.pixels().as_flattened();
         let out: &mut Image<[u8; 3]> = &mut quarter;
-        box_mean::<3, 4>(bytes, size.width, out.pixels_mut().as_flattened_mut(), up.width);
+        box_mean::<3, 4>(level, bytes, size.width, out.pixels_mut().as_flattened_mut(), up.width);
         for c in 0..3 {
             let expected = plain::box_mean(&plain::channel(&rgb, c), 4, up);
             assert_eq!(plain::channel(&quarter, c), expected, "{c}, {size}");
         }
         let gray = plain::channel(&rgb, 1);
-        box_mean::<1, 2>(gray.pixels(), size.width, half.pixels_mut(), down.width);
+        box_mean::<1, 2>(level, gray.pixels(), size.width, half.pixels_mut(), down.width);
         assert_eq!(half, plain::box_mean(&gray, 2, down), "{size}");
     }
 }
@@ -223,7 +230,7 @@ fn both_views_take_the_same_way() {
                     config.preprocess.scale = scale;
                     config.preprocess.denoise = denoise;
                     config.preprocess.illumination = illumination;
-                    let mut stage = Preprocess::new(&config, size);
+                    let mut stage = Preprocess::new(&config, size, simd::detect());
                     let wanted = Size::new(67 / scale as usize, 41 / scale as usize);
                     assert_eq!(stage.output_size(), wanted);
                     let mut out = Perception::new(wanted, Arc::clone(&rig));
@@ -247,7 +254,7 @@ fn a_gray_picture_gives_equal_channels() {
     let size = Size::new(33, 17);
     let gray = Noise(9).gray(size);
     let rig = rig(size);
-    let mut stage = Preprocess::new(&Config::default(), size);
+    let mut stage = Preprocess::new(&Config::default(), size, simd::detect());
     let mut out = Perception::new(size, Arc::clone(&rig));
     let mut right = View::default();
     let picture = Picture::Gray(gray.clone());
@@ -262,7 +269,7 @@ fn the_scaled_rig_is_made_once_per_calibration() {
     let size = Size::new(64, 32);
     let mut config = Config { rectify: true, ..Config::default() };
     config.preprocess.scale = 2;
-    let mut stage = Preprocess::new(&config, size);
+    let mut stage = Preprocess::new(&config, size, simd::detect());
     let first = rig(size);
     let mut out = Perception::new(stage.output_size(), Arc::clone(&first));
     let mut right = View::default();

@@ -29,8 +29,8 @@ use super::reference::{Noise, ODD_SIZES};
 
 fn view(rgb: Image<[u8; 3]>) -> View {
     let mut view = View { rgb, ..View::default() };
-    luma(&view.rgb, &mut view.gray);
-    gradient(&view.gray, &mut view.gradient);
+    luma(simd::detect(), &view.rgb, &mut view.gray);
+    gradient(simd::detect(), &view.gray, &mut view.gradient);
     view
 }
 
@@ -60,7 +60,7 @@ impl World {
     fn new(rgb: Image<[u8; 3]>) -> Self {
         let left = view(rgb);
         let mut cells = View::default();
-        shrink_view(&left, &mut cells);
+        shrink_view(simd::detect(), &left, &mut cells);
         let size = left.gray.size();
         let filled = Image::from_fn(size.divided_by(4), |x, y| {
             3.0 + y as f32 * 0.7 + if (4..9).contains(&x) { 17.25 } else { 0.0 }
@@ -180,7 +180,7 @@ fn the_quarter_size_view_holds_means() {
     for size in ODD_SIZES {
         let left = view(Noise(2).rgb(size));
         let mut cells = View::default();
-        shrink_view(&left, &mut cells);
+        shrink_view(simd::detect(), &left, &mut cells);
         let small = size.divided_by(4);
         assert_eq!(cells.gray, plain_view::box_mean(&left.gray, 4, small), "{size}");
         assert_eq!(cells.gradient, plain_view::gradient(&cells.gray));
@@ -227,7 +227,7 @@ fn color_contrast_is_the_distance_from_the_mean_color() {
     for size in ODD_SIZES {
         let world = World::noise(size, 5);
         let expected = plain::color(&world.cells.rgb);
-        assert_near(&map_of(&mut Color::default(), &world), &expected, 1e-3, "C_C");
+        assert_near(&map_of(&mut Color::new(simd::detect()), &world), &expected, 1e-3, "C_C");
     }
 }
 
@@ -294,7 +294,7 @@ fn the_paper_mode_is_equation_4_cue_by_cue() {
         let world = World::noise(size, 9).after(gray);
         let cues: [&mut dyn Cue; 5] = [
             &mut Intensity::default(),
-            &mut Color::default(),
+            &mut Color::new(simd::detect()),
             &mut Orientation::default(),
             &mut Depth::default(),
             &mut Motion,
@@ -307,7 +307,7 @@ fn the_paper_mode_is_equation_4_cue_by_cue() {
             }
         }
         let mut out = Image::default();
-        Paper::new(&Config::default().saliency.paper).run(&world.scene(), &mut out);
+        Paper::new(&Config::default().saliency.paper, simd::detect()).run(&world.scene(), &mut out);
         let expected = plain::normalize(&sum, f64::from(LEAST));
         assert_near(&out, &expected, 1e-5, "S");
     }
@@ -320,9 +320,9 @@ fn weights_count_relative_to_their_sum_and_zero_switches_a_cue_off() {
     (weights.color, weights.orientation, weights.depth, weights.motion) = (0.0, 0.0, 0.0, 0.0);
     let (mut one, mut other) = (Image::default(), Image::default());
     weights.intensity = 0.25;
-    Paper::new(&weights).run(&world.scene(), &mut one);
+    Paper::new(&weights, simd::detect()).run(&world.scene(), &mut one);
     weights.intensity = 1.0;
-    Paper::new(&weights).run(&world.scene(), &mut other);
+    Paper::new(&weights, simd::detect()).run(&world.scene(), &mut other);
     assert_eq!(one, other);
     let mut expected = map_of(&mut Intensity::default(), &world);
     normalize(&mut expected, LEAST);

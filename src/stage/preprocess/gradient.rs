@@ -1,12 +1,18 @@
 //! Gradient magnitude.
 
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
 use rayon::prelude::*;
 
 use crate::image::Image;
+use crate::simd::{Level, dispatch};
 
 /// (|Sobel x| + |Sobel y|) / 8, rounded down: 0..=255. Beyond the image's edge
 /// its outermost pixels continue.
-pub fn gradient(gray: &Image<u8>, out: &mut Image<u8>) {
+pub fn gradient(level: Level, gray: &Image<u8>, out: &mut Image<u8>) {
     out.resize(gray.size());
     let (width, height) = (gray.width(), gray.height());
     if gray.size().is_empty() {
@@ -17,11 +23,12 @@ pub fn gradient(gray: &Image<u8>, out: &mut Image<u8>) {
             let up = gray.row(y.saturating_sub(1));
             let here = gray.row(y);
             let down = gray.row((y + 1).min(height - 1));
-            gradient_row(up, here, down, out);
+            dispatch!(level, _simd => gradient_row(up, here, down, out));
         },
     );
 }
 
+#[inline(always)]
 fn gradient_row(up: &[u8], here: &[u8], down: &[u8], out: &mut [u8]) {
     let width = here.len();
     let at = |l: usize, c: usize, r: usize| {

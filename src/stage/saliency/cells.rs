@@ -2,6 +2,7 @@
 
 use crate::image::Size;
 use crate::perception::View;
+use crate::simd::Level;
 use crate::stage::coarse::CELL;
 use crate::stage::preprocess::gradient::gradient;
 use crate::stage::preprocess::resize::box_mean;
@@ -11,17 +12,17 @@ use crate::stage::preprocess::resize::box_mean;
 /// that of the small gray image.
 ///
 /// A view without colours gives one without colours.
-pub fn shrink_view(view: &View, out: &mut View) {
+pub fn shrink_view(level: Level, view: &View, out: &mut View) {
     let size = view.gray.size().divided_by(CELL);
     out.gray.resize(size);
     let width = view.gray.width();
-    box_mean::<1, CELL>(view.gray.pixels(), width, out.gray.pixels_mut(), size.width);
+    box_mean::<1, CELL>(level, view.gray.pixels(), width, out.gray.pixels_mut(), size.width);
     if view.rgb.size() == view.gray.size() {
         out.rgb.resize(size);
         let rgb = out.rgb.pixels_mut().as_flattened_mut();
-        box_mean::<3, CELL>(view.rgb.pixels().as_flattened(), width, rgb, size.width);
+        box_mean::<3, CELL>(level, view.rgb.pixels().as_flattened(), width, rgb, size.width);
     } else {
         out.rgb.resize(Size::default());
     }
-    gradient(&out.gray, &mut out.gradient);
+    gradient(level, &out.gray, &mut out.gradient);
 }

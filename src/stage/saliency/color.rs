@@ -1,6 +1,7 @@
 //! Colour contrast.
 
 use crate::image::Image;
+use crate::simd::Level;
 use crate::stage::preprocess::denoise::gaussian3;
 use crate::stage::saliency::{AttentionScene, Cue};
 
@@ -11,11 +12,18 @@ const FULL: f32 = 100.0;
 /// `C_C`: frequency-tuned contrast (Achanta et al. 2009), the distance in CIE
 /// L*a*b* of each slightly blurred pixel from the mean of the image, in units
 /// of ΔE = 100.
-#[derive(Default)]
 pub struct Color {
+    level: Level,
     lab: Lab,
     blurred: Vec<u8>,
     colors: Vec<[f32; 3]>,
+}
+
+impl Color {
+    /// The cue at this SIMD level.
+    pub fn new(level: Level) -> Self {
+        Self { level, lab: Lab::default(), blurred: Vec::new(), colors: Vec::new() }
+    }
 }
 
 impl Cue for Color {
@@ -24,7 +32,7 @@ impl Cue for Color {
         out.resize(rgb.size());
         let bytes = rgb.pixels().as_flattened();
         self.blurred.resize(bytes.len(), 0);
-        gaussian3::<3>(bytes, rgb.width(), &mut self.blurred);
+        gaussian3::<3>(self.level, bytes, rgb.width(), &mut self.blurred);
         let (pixels, _) = self.blurred.as_chunks::<3>();
         self.colors.resize(pixels.len(), [0.0; 3]);
         let mut sum = [0.0_f64; 3];

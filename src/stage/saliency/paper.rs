@@ -2,6 +2,7 @@
 
 use crate::config;
 use crate::image::Image;
+use crate::simd::Level;
 use crate::stage::saliency::color::Color;
 use crate::stage::saliency::depth::Depth;
 use crate::stage::saliency::intensity::Intensity;
@@ -27,14 +28,14 @@ pub struct Paper {
 
 impl Paper {
     /// The fusion with these weights.
-    pub fn new(weights: &config::Paper) -> Self {
+    pub fn new(weights: &config::Paper, level: Level) -> Self {
         let w =
             [weights.intensity, weights.color, weights.orientation, weights.depth, weights.motion];
         let sum: f64 = w.iter().sum();
         let weights = w.map(|w| if sum > 0.0 { (w / sum) as f32 } else { 0.0 });
         Self {
             intensity: Intensity::default(),
-            color: Color::default(),
+            color: Color::new(level),
             orientation: Orientation::default(),
             depth: Depth::default(),
             motion: Motion,
