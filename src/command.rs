@@ -1,3 +1,4 @@
 //! The commands: pairings of a source and sinks.
 
 pub mod node;
+pub mod render;

@@ -4,6 +4,7 @@ pub mod bag;
 pub mod live;
 pub mod picture;
 pub mod report;
+pub mod scene;
 pub mod score;
 
 use crate::input::{Observation, Tally};

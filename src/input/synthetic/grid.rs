@@ -119,7 +119,7 @@ impl ShadowGrid {
     /// True when nothing stands between `point` and the light.
     pub fn is_lit(&self, parts: &[Part], point: Vec3) -> bool {
         let place = |k: usize| {
-            let value = ((self.across[k].dot(&point) - self.origin[k]) / self.cell).floor();
+            let value = (self.across[k].dot(&point) - self.origin[k]) / self.cell;
             (value >= 0.0 && value < self.size[k] as f64).then_some(value as usize)
         };
         let (Some(x), Some(y)) = (place(0), place(1)) else { return true };

@@ -20,6 +20,13 @@ pub fn unit(hash: u32) -> f64 {
     f64::from(hash >> 8) / 16_777_216.0
 }
 
+/// The largest whole number not above `x`, for `|x| < 2^31`. Without the
+/// newest instructions `f64::floor` is a call, and noise needs little else.
+pub fn floor(x: f64) -> i32 {
+    let whole = x as i32;
+    whole - i32::from(x < f64::from(whole))
+}
+
 /// A number in 0..1 for a lattice point.
 pub fn cell(seed: u32, x: i32, y: i32) -> f64 {
     unit(hash(seed, x, y, 0))
@@ -41,9 +48,8 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 
 /// Value noise over the plane, -1..1, with cells of size 1.
 pub fn noise2(seed: u32, x: f64, y: f64) -> f64 {
-    let (fx, fy) = (x.floor(), y.floor());
-    let (ix, iy) = (fx as i32, fy as i32);
-    let (tx, ty) = (smooth(x - fx), smooth(y - fy));
+    let (ix, iy) = (floor(x), floor(y));
+    let (tx, ty) = (smooth(x - f64::from(ix)), smooth(y - f64::from(iy)));
     let corner = |dx, dy| unit(hash(seed, ix + dx, iy + dy, 0));
     let low = mix(corner(0, 0), corner(1, 0), tx);
     let high = mix(corner(0, 1), corner(1, 1), tx);
@@ -52,18 +58,16 @@ pub fn noise2(seed: u32, x: f64, y: f64) -> f64 {
 
 /// Value noise in space, -1..1, with cells of size 1.
 pub fn noise3(seed: u32, x: f64, y: f64, z: f64) -> f64 {
-    let fz = z.floor();
-    let iz = fz as i32;
-    let (fx, fy) = (x.floor(), y.floor());
-    let (ix, iy) = (fx as i32, fy as i32);
-    let (tx, ty) = (smooth(x - fx), smooth(y - fy));
+    let iz = floor(z);
+    let (ix, iy) = (floor(x), floor(y));
+    let (tx, ty) = (smooth(x - f64::from(ix)), smooth(y - f64::from(iy)));
     let layer = |dz: i32| {
         let corner = |dx, dy| unit(hash(seed, ix + dx, iy + dy, iz + dz));
         let low = mix(corner(0, 0), corner(1, 0), tx);
         let high = mix(corner(0, 1), corner(1, 1), tx);
         mix(low, high, ty)
     };
-    2.0 * mix(layer(0), layer(1), smooth(z - fz)) - 1.0
+    2.0 * mix(layer(0), layer(1), smooth(z - f64::from(iz))) - 1.0
 }
 
 /// How much of an octave with cells of size `1 / frequency` survives a pixel
@@ -123,5 +127,5 @@ pub fn stripe(x: f64, half: f64, footprint: f64) -> f64 {
 
 /// `x` folded into `-period / 2 .. period / 2`.
 pub fn fold(x: f64, period: f64) -> f64 {
-    x - period * (x / period + 0.5).floor()
+    x - period * f64::from(floor(x / period + 0.5))
 }

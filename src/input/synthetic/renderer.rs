@@ -105,6 +105,8 @@ impl<'a> Renderer<'a> {
     ) -> Vec3 {
         let list = tiles.list(x / TILE, y / TILE);
         let step = 1.0 / samples as f64;
+        // Neighbouring pixels ask for other points of the lights.
+        let phase = samples * samples * ((x & 1) + 2 * (y & 1));
         let mut sum = Vec3::zeros();
         for j in 0..samples {
             for i in 0..samples {
@@ -112,7 +114,9 @@ impl<'a> Renderer<'a> {
                 let dy = (j as f64 + 0.5) * step - 0.5;
                 let ray = view.ray(x as f64 + dx, y as f64 + dy);
                 let light = match self.first(list, &ray) {
-                    Some(seen) => self.shade(&ray, &seen, step / view.focal, j * samples + i),
+                    Some(seen) => {
+                        self.shade(&ray, &seen, step / view.focal, phase + j * samples + i)
+                    }
                     None => self.world.backdrop.light(ray.direction.normalize()),
                 };
                 // A single sun glint must not outshine all other samples.

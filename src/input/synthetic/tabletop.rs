@@ -107,14 +107,20 @@ fn flat_things(parts: &mut Vec<Part>) {
 }
 
 fn lighting() -> Lighting {
-    // A window on the left: sixteen points of it.
+    // A window on the left: sixteen points of it, in an order in which any
+    // four in a row surround the middle.
     let main = Vec3::new(-0.80, -0.30, 0.78).normalize();
     let aside = main.cross(&Vec3::z()).normalize();
     let above = aside.cross(&main);
-    // The four samples of a pixel ask for points 0 to 3.
-    let sun = [(-0.9, -0.3), (0.3, -0.9), (0.9, 0.3), (-0.3, 0.9)]
-        .map(|(a, b)| (main + aside * (0.05 * a) + above * (0.05 * b)).normalize())
-        .to_vec();
+    let quarters = [(-0.25, -0.25), (0.25, 0.25), (0.25, -0.25), (-0.25, 0.25)];
+    let sun = quarters
+        .iter()
+        .flat_map(|(p, q)| {
+            [(-0.5, -0.5), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5)].map(|(a, b)| {
+                (main + aside * (0.11 * (a + p)) + above * (0.11 * (b + q))).normalize()
+            })
+        })
+        .collect();
     let pale = rgb(0xE4_E0_DA) * 0.34;
     let high = |x: f64, y: f64| (Vec3::new(x, y, 1.5).normalize(), pale * 0.9);
     let low = |x: f64, y: f64, share: f64| (Vec3::new(x, y, 0.5).normalize(), pale * share);

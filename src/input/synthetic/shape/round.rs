@@ -1,6 +1,6 @@
 //! Ellipsoids, foliage and capsules.
 
-use super::super::noise::{fractal3, hash, noise3, unit};
+use super::super::noise::{floor, hash, noise3, unit};
 use super::{Contact, Ray, Span, Vec3};
 
 /// An ellipsoid around the origin.
@@ -66,15 +66,15 @@ impl Foliage {
 
     fn is_leaf(&self, p: Vec3) -> bool {
         let q = p / self.leaf;
-        let clump = fractal3(self.seed, [0.4 * q.x, 0.4 * q.y, 0.4 * q.z], 2, 0.0);
-        noise3(self.seed ^ 0x55, q.x, q.y, q.z) + 1.2 * clump > -0.12
+        let clump = noise3(self.seed, 0.4 * q.x, 0.4 * q.y, 0.4 * q.z);
+        noise3(self.seed ^ 0x55, q.x, q.y, q.z) + 0.6 * clump > -0.12
     }
 
     /// Outward normal, each leaf leaning its own way.
     pub fn normal(&self, point: Vec3) -> Vec3 {
         let out = point.component_div(&self.radii.component_mul(&self.radii)).normalize();
         let q = point / self.leaf;
-        let h = hash(self.seed, q.x.floor() as i32, q.y.floor() as i32, q.z.floor() as i32);
+        let h = hash(self.seed, floor(q.x), floor(q.y), floor(q.z));
         let lean = |shift: u32| unit(h.rotate_left(shift)) - 0.5;
         (out + 1.1 * Vec3::new(lean(0), lean(9), lean(18))).normalize()
     }

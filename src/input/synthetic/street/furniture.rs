@@ -84,8 +84,8 @@ pub fn sign_post(
     parts.push(Part::new(shape, at, Material::Sign { kind, half }, object));
 }
 
-/// Adds a tree. Its trunk is the object; the crown, out of the way of
-/// traffic, is background.
+/// Adds a tree. Its trunk up to 2.5 m is the object; the crown, out of the way
+/// of traffic, is background.
 pub fn tree(parts: &mut Vec<Part>, object: u16, (x, y): (f64, f64), ground: f64, seed: u32) {
     let pose = Pose::at(x, y, ground).turned(2, pick(seed, 0, 0.0, 6.0));
     let girth = pick(seed, 1, 0.13, 0.19);
@@ -93,11 +93,11 @@ pub fn tree(parts: &mut Vec<Part>, object: u16, (x, y): (f64, f64), ground: f64,
         (1.7 * girth, 0.0),
         (1.2 * girth, 0.15),
         (girth, 0.5),
-        (0.85 * girth, 2.4),
-        (0.6 * girth, 4.2),
-        (0.0, 4.6),
+        (0.85 * girth, 2.5),
     ]);
     parts.push(Part::new(Shape::Lathe(trunk), pose, Material::Bark(seed), object));
+    let top = Lathe::new(vec![(0.85 * girth, 2.5), (0.6 * girth, 4.2), (0.0, 4.6)]);
+    parts.push(Part::new(Shape::Lathe(top), pose, Material::Bark(seed), 0));
     for k in 0..5 {
         let angle = 1.257 * f64::from(k) + pick(seed, 10 + k as usize, -0.4, 0.4);
         let (s, c) = (libm::sin(angle), libm::cos(angle));

@@ -124,7 +124,7 @@ pub fn cabin(look: &CarLook, spot: &Spot) -> Finish {
         (fold(p.y, 0.7).abs() - 0.16).max((p.z - look.belt - 0.22).abs() - 0.13),
         2.0 * fp,
     );
-    let inside = blend(rgb(0x20_24_28), rgb(0x3C_38_34), seat);
+    let inside = blend(rgb(0x20_24_28), rgb(0x2E_2E_30), seat);
     let albedo = blend(look.paint, inside, glass);
     let rubber = stripe(spot.inset - 0.055, 0.012, fp) * f64::from(u8::from(glass > 0.0));
     let coat = 0.05 + 0.11 * glass;

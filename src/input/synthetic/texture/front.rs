@@ -1,7 +1,7 @@
 //! Walls, windows and shops of house fronts.
 
 use super::super::finish::{Finish, Spot, blend, gray, rgb};
-use super::super::noise::{cell, coverage, fold, fractal2, hash, stripe, unit};
+use super::super::noise::{cell, coverage, floor, fold, fractal2, hash, stripe, unit};
 use super::super::shape::{Facade, Opening, Vec3, facade_face};
 use super::print::lettering;
 
@@ -147,9 +147,9 @@ impl Front {
         // Goods on shelves behind the glass, lit from inside.
         let (shelf, slot) = ((v * 4.0).floor(), (u * width * 3.2 + shelf_shift(v)).floor());
         let goods = hash(key, shelf as i32, slot as i32, 2);
-        let tone = |shift: u32| {
-            0.08 + 0.6 * unit(goods.rotate_left(shift)) * unit(goods.rotate_left(shift + 11))
-        };
+        // Muted colours: the channels share one brightness.
+        let light = 0.10 + 0.45 * unit(goods.rotate_left(5));
+        let tone = |shift: u32| light * (0.55 + 0.6 * unit(goods.rotate_left(shift)));
         let height = 0.35 + 0.55 * unit(goods.rotate_left(21));
         let here = (v * 4.0).fract();
         let mut inside = if here < height && here > 0.06 {
@@ -181,7 +181,7 @@ fn masonry(front: &Front, x: f64, z: f64, blur: f64) -> Vec3 {
             let (long, high) = (0.25, 0.085);
             let course = (z / high).floor();
             let shifted = x + 0.5 * long * (course - 2.0 * (course / 2.0).floor());
-            let tint = cell(seed ^ 1, (shifted / long).floor() as i32, course as i32);
+            let tint = cell(seed ^ 1, floor(shifted / long), course as i32);
             let joint =
                 stripe(fold(z, high), 0.007, blur).max(stripe(fold(shifted, long), 0.007, blur));
             let grain = fractal2(seed ^ 2, 24.0 * x, 24.0 * z, 2, 24.0 * blur);
@@ -198,7 +198,7 @@ fn masonry(front: &Front, x: f64, z: f64, blur: f64) -> Vec3 {
             let (long, high) = (0.9, 0.42);
             let course = (z / high).floor();
             let shifted = x + 0.5 * long * (course - 2.0 * (course / 2.0).floor());
-            let tint = cell(seed ^ 6, (shifted / long).floor() as i32, course as i32);
+            let tint = cell(seed ^ 6, floor(shifted / long), course as i32);
             let joint =
                 stripe(fold(z, high), 0.014, blur).max(stripe(fold(shifted, long), 0.014, blur));
             let rough = fractal2(seed ^ 7, 6.0 * x, 6.0 * z, 4, 6.0 * blur);

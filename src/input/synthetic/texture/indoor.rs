@@ -1,7 +1,9 @@
 //! Wood, plaster, paper, ceramics and glass.
 
 use super::super::finish::{Finish, Spot, blend, gray, rgb};
-use super::super::noise::{cell, coverage, fold, fractal2, fractal3, hash, noise2, stripe, unit};
+use super::super::noise::{
+    cell, coverage, floor, fold, fractal2, fractal3, hash, noise2, stripe, unit,
+};
 use super::super::shape::Vec3;
 use super::print::{carton, landscape, lettering, text_block};
 
@@ -243,7 +245,7 @@ pub fn sheet(seed: u32, size: (f64, f64), spot: &Spot) -> Finish {
 pub fn mat(colour: Vec3, second: Vec3, half: (f64, f64), spot: &Spot) -> Finish {
     let (x, y) = (spot.local.x, spot.local.y);
     let fp = spot.blur;
-    let (i, j) = ((x / 0.006).floor() as i32, (y / 0.006).floor() as i32);
+    let (i, j) = (floor(x / 0.006), floor(y / 0.006));
     let over = if (i + j) & 1 == 0 { 1.0 } else { 0.72 };
     let thread = 0.85 + 0.3 * cell(85, if (i + j) & 1 == 0 { i } else { 9000 + j }, 0);
     let plaid = stripe(fold(x, 0.05), 0.009, fp).max(stripe(fold(y, 0.05), 0.009, fp));

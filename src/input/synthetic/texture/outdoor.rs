@@ -1,7 +1,7 @@
 //! Clothes, skin, bark, leaves, metal and signs.
 
 use super::super::finish::{Finish, Spot, blend, gray, rgb};
-use super::super::noise::{coverage, fold, fractal2, fractal3, hash, stripe, unit};
+use super::super::noise::{coverage, floor, fold, fractal2, fractal3, hash, stripe, unit};
 use super::super::shape::Vec3;
 
 /// A pattern woven into or printed on cloth.
@@ -77,7 +77,7 @@ pub fn bark(seed: u32, spot: &Spot) -> Finish {
 /// Leaves of a crown or hedge.
 pub fn leaves(seed: u32, autumn: f64, leaf: f64, spot: &Spot) -> Finish {
     let q = spot.local / leaf;
-    let h = hash(seed, q.x.floor() as i32, q.y.floor() as i32, q.z.floor() as i32);
+    let h = hash(seed, floor(q.x), floor(q.y), floor(q.z));
     let green = blend(rgb(0x3E_62_22), rgb(0x8A_A8_44), unit(h));
     let yellow = blend(rgb(0xA8_7A_24), rgb(0xC8_A8_3C), unit(h.rotate_left(9)));
     let clump = fractal3(seed ^ 2, [0.3 * q.x, 0.3 * q.y, 0.3 * q.z], 2, 0.3 * spot.blur / leaf);

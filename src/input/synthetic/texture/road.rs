@@ -2,7 +2,7 @@
 //! line is x = 0.
 
 use super::super::finish::{Finish, Spot, blend, gray, rgb};
-use super::super::noise::{cell, coverage, fold, fractal2, hash, noise2, stripe, unit};
+use super::super::noise::{cell, coverage, floor, fold, fractal2, hash, noise2, stripe, unit};
 use super::super::shape::Vec3;
 
 /// Distance of the edge line from the centre line in metres.
@@ -28,7 +28,7 @@ pub fn asphalt(spot: &Spot) -> Finish {
     let mut colour = Vec3::new(tone * 1.02, tone, tone * 0.97);
 
     // Repaired rectangles, one in some stretches of 9 m.
-    let plot = (y / 9.0).floor() as i32;
+    let plot = floor(y / 9.0);
     if cell(15, plot, i32::from(x > 0.0)) > 0.45 {
         let middle = Vec3::new(
             x.signum() * (0.9 + 2.6 * cell(16, plot, i32::from(x > 0.0))),
@@ -80,7 +80,7 @@ fn markings(x: f64, y: f64, footprint: f64, blur: f64) -> f64 {
 
 fn manhole(spot: &Spot, ground: Vec3) -> Vec3 {
     let (x, y) = (spot.local.x, spot.local.y);
-    let plot = (y / 13.0).floor() as i32;
+    let plot = floor(y / 13.0);
     let cx = -2.6 + 5.2 * cell(26, plot, 0);
     let cy = 13.0 * (f64::from(plot) + 0.2 + 0.6 * cell(27, plot, 0));
     let r = ((x - cx) * (x - cx) + (y - cy) * (y - cy)).sqrt();
@@ -99,7 +99,7 @@ fn manhole(spot: &Spot, ground: Vec3) -> Vec3 {
 /// Kerb stones.
 pub fn kerb(spot: &Spot) -> Finish {
     let y = spot.local.y;
-    let stone = (y / 1.0).floor() as i32;
+    let stone = floor(y / 1.0);
     let tint = 0.85 + 0.3 * cell(31, stone, 0);
     let joint = stripe(fold(y, 1.0), 0.012, 1.6 * spot.blur);
     let speck = fractal2(32, 30.0 * y, 30.0 * (spot.local.x + spot.local.z), 3, 30.0 * spot.blur);
