@@ -1,6 +1,7 @@
 //! Doors in: where stereo frames come from.
 
 pub mod bag;
+pub mod dataset;
 pub mod live;
 pub mod synthetic;
 

@@ -4,6 +4,8 @@
 mod it {
     #[cfg(feature = "tool")]
     mod bag;
+    #[cfg(feature = "tool")]
+    mod dataset;
     mod depth;
     #[cfg(feature = "tool")]
     mod interop;

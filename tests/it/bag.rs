@@ -3,7 +3,7 @@
 
 mod broken;
 mod choice;
-mod recipe;
+pub mod recipe;
 mod sink;
 
 use std::fs;
