@@ -66,6 +66,8 @@ pub struct Engine {
     clock: Clock,
     centred_roi: Option<f32>,
     running: Option<Running>,
+    /// The parameters have changed since `running` was built.
+    stale: bool,
     last_stamp: Option<Stamp>,
     jumps_back: u64,
 }
@@ -85,6 +87,7 @@ impl Engine {
             clock: monotonic_clock(),
             centred_roi: None,
             running: None,
+            stale: false,
             last_stamp: None,
             jumps_back: 0,
         }
@@ -102,11 +105,11 @@ impl Engine {
         &self.config
     }
 
-    /// Changes the parameters from the next frame on.
+    /// Changes the parameters from the next frame on. Tracks live on.
     pub fn set_config(&mut self, config: Config) {
         if config != self.config {
             self.config = config;
-            self.running = None;
+            self.stale = true;
         }
     }
 
@@ -134,9 +137,10 @@ impl Engine {
 
         let size = frame.left.size();
         let running = match self.running.take() {
-            Some(running) if running.size == size => running,
-            _ => self.start(size, frame),
+            Some(running) if running.size == size && !self.stale => running,
+            old => self.start(size, frame, old.map(|old| old.pipeline)),
         };
+        self.stale = false;
         let running = self.running.insert(running);
         running.pipeline.process(frame, &mut running.perception);
         &running.perception
@@ -154,8 +158,11 @@ impl Engine {
         Some(std::mem::replace(&mut running.perception, next))
     }
 
-    fn start(&self, size: Size, frame: &StereoFrame) -> Running {
-        let mut pipeline = Pipeline::new(&self.config, size, self.level).with_clock(self.clock);
+    fn start(&self, size: Size, frame: &StereoFrame, old: Option<Pipeline>) -> Running {
+        let mut pipeline = match old {
+            Some(old) => old.reconfigured(&self.config, size, self.level),
+            None => Pipeline::new(&self.config, size, self.level).with_clock(self.clock),
+        };
         if let Some(fraction) = self.centred_roi {
             pipeline = pipeline.with_centred_roi(fraction);
         }

@@ -78,6 +78,18 @@ impl Pipeline {
         self
     }
 
+    /// The pipeline for other parameters or another size that goes on with the
+    /// tracks of this one, so that a parameter changed while running costs no
+    /// identity.
+    #[must_use]
+    pub fn reconfigured(self, config: &Config, size: Size, level: Level) -> Self {
+        let old_size = self.output_size();
+        let mut next = Self::new(config, size, level).with_clock(self.clock);
+        next.track = self.track;
+        next.track.configure(config, next.output_size() == old_size);
+        next
+    }
+
     /// Size of the processed views: the picture's size divided by `preprocess.scale`.
     pub fn output_size(&self) -> Size {
         self.preprocess.output_size()

@@ -30,10 +30,11 @@ pub const fn output() -> QosPolicies {
     keep_last(DEPTH).reliable(Duration::ZERO).build()
 }
 
-/// As [`output`], with room for some seconds of small messages while a
-/// subscriber is slow to acknowledge.
+/// As [`output`], with room for a minute of small messages: a subscriber that
+/// crashed acknowledges nothing until its lease of some 20 s has run out, and
+/// the others must not miss anything because of it.
 pub const fn small_output() -> QosPolicies {
-    keep_last(DEPTH).reliable(Duration::ZERO).resource_limits(limits(50)).build()
+    keep_last(DEPTH).reliable(Duration::ZERO).resource_limits(limits(1000)).build()
 }
 
 /// Whoever wants every message of an [`output`]: reliable, keep last 50.

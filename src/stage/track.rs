@@ -62,6 +62,23 @@ impl Track {
         }
     }
 
+    /// Takes other parameters and goes on with the tracks, unless the views have
+    /// changed their size: then the tracks end, and ids still are not used again.
+    pub fn configure(&mut self, config: &Config, same_size: bool) {
+        let fresh = Self::new(config);
+        self.enabled = fresh.enabled;
+        self.min_iou = fresh.min_iou;
+        self.confirm = fresh.confirm;
+        self.max_age = fresh.max_age;
+        self.max_count = fresh.max_count;
+        if !same_size {
+            self.last = None;
+            for track in &mut self.tracks {
+                track.alive = false;
+            }
+        }
+    }
+
     /// Forgets all tracks; ids start again from 1.
     pub fn reset(&mut self) {
         self.last = None;

@@ -26,7 +26,7 @@ fn a_cyclone_peer_gets_one_region_array_per_pair() {
     }
     let python = std::env::var("SALIENT_STEREO_PYTHON").unwrap_or_else(|_| "python3".into());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interop/cyclone_stereo.py");
-    for (test, reliability) in [(2, "reliable"), (3, "best_effort")] {
+    for (test, reliability) in [(3, "reliable"), (3, "best_effort")] {
         let domain = 1 + (std::process::id() % 24) as u16 * 4 + test;
         let names = Names::new("/robot", NODE_NAME, &[]).unwrap();
         let config = Config::default().with("saliency.mode", &json!("paper")).unwrap();

@@ -1,6 +1,8 @@
 //! The node on a real DDS network, on 127.0.0.1 only: two participants of our
 //! own, one the node, one its peer. Bounded in count and time.
 
+mod faults;
+
 use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -102,12 +104,17 @@ fn small() -> Config {
         .unwrap()
 }
 
+fn start(config: Config, environment: &Environment) -> NodeRuntime {
+    let mut options = NodeOptions::new(config, names("eye"), environment.clone());
+    options.rosout = false;
+    NodeRuntime::start(options).unwrap()
+}
+
 #[test]
 fn every_pair_comes_back_as_one_region_array() {
     const PAIRS: u32 = 12;
     let environment = environment(0);
-    let mut runtime =
-        NodeRuntime::start(NodeOptions::new(small(), names("eye"), environment.clone())).unwrap();
+    let mut runtime = start(small(), &environment);
     let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
     let mut player = StereoPlayer::new(&mut peer, false).unwrap();
     let mut listener = RegionsListener::new(&mut peer, runtime.regions_topic()).unwrap();
@@ -177,8 +184,7 @@ fn parameters_are_listed_described_set_and_refused() {
     let environment = environment(1);
     let mut config = small();
     config.use_sim_time = true;
-    let mut runtime =
-        NodeRuntime::start(NodeOptions::new(config, names("eye"), environment.clone())).unwrap();
+    let mut runtime = start(config, &environment);
     let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
     let service = |name: &str| format!("/robot/eye/{name}");
 
