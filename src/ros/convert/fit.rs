@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use super::region::tighten;
 use crate::ros::cdr;
 use crate::ros::message::geometry_msgs::Point32;
 use crate::ros::message::salient_stereo_msgs::SalientRegionArray;
@@ -43,10 +44,11 @@ impl fmt::Display for Reduction {
     }
 }
 
-/// Reduces an array that is larger than [`REGIONS_LIMIT`] when encoded: leaves
-/// out the masks of the least important regions, then simplifies contours.
+/// Reduces an array that is larger than [`REGIONS_LIMIT`] when encoded: compresses
+/// masks more thoroughly, leaves out those of the least important regions, then
+/// simplifies contours.
 ///
-/// `None` when it was small enough and is unchanged.
+/// `None` when nothing had to be left out.
 pub fn fit_regions(array: &mut SalientRegionArray) -> Option<Reduction> {
     let mut bytes = Vec::new();
     let mut len = |array: &SalientRegionArray| {
@@ -57,7 +59,14 @@ pub fn fit_regions(array: &mut SalientRegionArray) -> Option<Reduction> {
     if bytes_before <= REGIONS_LIMIT {
         return None;
     }
-    let mut reduction = Reduction { bytes_before, bytes_after: bytes_before, ..Default::default() };
+    for region in &mut array.regions {
+        tighten(&mut region.mask);
+    }
+    let bytes_after = len(array);
+    if bytes_after <= REGIONS_LIMIT {
+        return None;
+    }
+    let mut reduction = Reduction { bytes_before, bytes_after, ..Default::default() };
     let mut last = array.regions.len();
     while reduction.bytes_after > REGIONS_LIMIT && last > 0 {
         let mut excess = reduction.bytes_after - REGIONS_LIMIT;
@@ -144,6 +153,18 @@ mod tests {
         let before = array.clone();
         assert_eq!(fit_regions(&mut array), None);
         assert_eq!(array, before);
+    }
+
+    #[test]
+    fn tighter_masks_may_be_enough() {
+        let mut array = region_array(&perception(60, 60), true);
+        for region in &mut array.regions {
+            region.contour.points.truncate(8);
+        }
+        assert!(cdr::encode(&array).len() > REGIONS_LIMIT);
+        assert_eq!(fit_regions(&mut array), None);
+        assert!(cdr::encode(&array).len() <= REGIONS_LIMIT);
+        assert!(array.regions.iter().all(|r| !r.mask.data.is_empty()));
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::header;
+use super::{compressed_picture, header};
+use crate::image::Picture;
 use crate::perception::{Perception, Region};
 use crate::ros::message::geometry_msgs::{Point32, Polygon};
 use crate::ros::message::salient_stereo_msgs::{SalientRegion, SalientRegionArray};
@@ -62,22 +63,41 @@ fn region(region: &Region, masks: bool, header: &Header) -> SalientRegion {
 }
 
 /// The mask of the box as PNG; empty when there is none.
-///
-/// Masks are runs of equal bytes: filtering rows against the one above leaves
-/// almost only zeros, which deflate to a few hundred bytes.
 fn mask(region: &Region, header: &Header) -> CompressedImage {
-    let mut data = Vec::new();
-    let whole = region.mask.len() == region.width as usize * region.height as usize;
-    let encoder = PngEncoder::new_with_quality(&mut data, CompressionType::Default, FilterType::Up);
-    if region.mask.is_empty()
-        || !whole
-        || encoder
-            .write_image(&region.mask, region.width, region.height, ExtendedColorType::L8)
-            .is_err()
-    {
+    if region.mask.is_empty() || region.mask.len() != (region.width * region.height) as usize {
         return CompressedImage::default();
     }
-    CompressedImage { header: header.clone(), format: "png".into(), data }
+    // A 600x300 mask: 0.05 ms and 2.9 KB; thorough compression takes 7 ms for 1.2 KB.
+    match png(&region.mask, region.width, region.height, CompressionType::Fast, FilterType::Sub) {
+        Some(data) => CompressedImage { header: header.clone(), format: "png".into(), data },
+        None => CompressedImage::default(),
+    }
+}
+
+/// Compresses a mask once more, thoroughly; leaves what is not a mask alone.
+pub fn tighten(mask: &mut CompressedImage) {
+    let Ok(Picture::Gray(image)) = compressed_picture(mask) else { return };
+    let (width, height) = (image.width() as u32, image.height() as u32);
+    let thorough =
+        png(image.pixels(), width, height, CompressionType::Default, FilterType::NoFilter);
+    if let Some(data) = thorough
+        && data.len() < mask.data.len()
+    {
+        mask.data = data;
+    }
+}
+
+fn png(
+    pixels: &[u8],
+    width: u32,
+    height: u32,
+    compression: CompressionType,
+    filter: FilterType,
+) -> Option<Vec<u8>> {
+    let mut data = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut data, compression, filter);
+    encoder.write_image(pixels, width, height, ExtendedColorType::L8).ok()?;
+    Some(data)
 }
 
 #[cfg(test)]
@@ -86,9 +106,8 @@ pub(super) mod tests {
 
     use super::*;
     use crate::camera::{Camera, StereoRig};
-    use crate::image::{Picture, Size};
+    use crate::image::Size;
     use crate::perception::TrackState;
-    use crate::ros::convert::compressed_picture;
     use crate::ros::message::geometry_msgs::{Point, Vector3};
     use crate::stamp::Stamp;
 
@@ -186,7 +205,19 @@ pub(super) mod tests {
         let Picture::Gray(image) = compressed_picture(mask).unwrap() else { panic!() };
         assert_eq!(image.size(), Size::new(81, 81));
         assert_eq!(image.pixels(), p.regions[0].mask);
-        assert!(mask.data.len() < 400, "{} bytes", mask.data.len());
+        assert!(mask.data.len() < 800, "{} bytes", mask.data.len());
+    }
+
+    #[test]
+    fn a_tightened_mask_is_smaller_and_shows_the_same() {
+        let mut mask = region_array(&perception(1, 40), true).regions.remove(0).mask;
+        let before = mask.clone();
+        tighten(&mut mask);
+        assert!(mask.data.len() < before.data.len());
+        assert_eq!(compressed_picture(&mask).unwrap(), compressed_picture(&before).unwrap());
+        let mut nothing = CompressedImage::default();
+        tighten(&mut nothing);
+        assert_eq!(nothing, CompressedImage::default());
     }
 
     #[test]

@@ -144,8 +144,7 @@ mod tests {
     fn rows_of_any_length_are_converted_to_their_end() {
         for width in [2, 62, 64, 66, 130] {
             let pixel = |x: usize| ((7 * x + 16) as u8, (50 + x / 2) as u8, (200 - x / 2) as u8);
-            let expected: Vec<_> =
-                (0..width).map(|x| pixel(x)).map(|(y, u, v)| rgb(y, u, v)).collect();
+            let expected: Vec<_> = (0..width).map(pixel).map(|(y, u, v)| rgb(y, u, v)).collect();
             let luma: Vec<u8> = (0..width).map(|x| pixel(x).0).collect();
             let half: Vec<_> = (0..width).step_by(2).map(|x| (pixel(x).1, pixel(x).2)).collect();
             let mut out = vec![[0; 3]; width];
