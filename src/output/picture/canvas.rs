@@ -97,7 +97,8 @@ impl<'a> Canvas<'a> {
     }
 
     /// A label beside the region's box: above it where there is room, else
-    /// below or inside, and clear of the labels that are there already.
+    /// below or inside, and clear of the labels that are there already; none
+    /// where there is no such place.
     pub fn label(&mut self, region: &Region, text: &str, color: [u8; 3]) {
         let pad = self.unit * 2;
         let letters = text.chars().count() as i64;
@@ -108,11 +109,13 @@ impl<'a> Canvas<'a> {
         let (top, bottom) = (i64::from(region.y), i64::from(region.y) + i64::from(region.height));
         let at = |y| Plate { x, y, width, height };
         let places = [at(top - height), at(bottom), at(top + 1), at(top - 2 * height - 1)];
-        let plate = places
+        let free = places
             .into_iter()
             .filter(|p| p.y >= 0 && p.y + p.height <= rows)
-            .find(|p| !self.plates.iter().any(|other| other.overlaps(p)))
-            .unwrap_or_else(|| at((top - height).clamp(0, (rows - height).max(0))));
+            .find(|p| !self.plates.iter().any(|other| other.overlaps(p)));
+        // In a crowd a label on another one could not be read, and would hide
+        // one of higher priority.
+        let Some(plate) = free else { return };
         self.plates.push(plate);
         self.fill(plate, color);
         self.text(plate.x + pad, plate.y + pad, text, [10, 12, 16]);

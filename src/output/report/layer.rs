@@ -48,7 +48,7 @@ impl Layer {
         encoder.set_palette(palette.as_flattened());
         encoder.set_trns(alpha);
         encoder.set_compression(png::Compression::Balanced);
-        encoder.set_filter(png::Filter::NoFilter);
+        encoder.set_filter(png::Filter::Adaptive);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(indices.pixels())?;
         writer.finish()?;

@@ -52,6 +52,9 @@ pub fn html(report: &ReportSink) -> String {
         tables +=
             &format!("<table><caption>Pixels and objects</caption><tbody>{rows}</tbody></table>");
     }
+    if tables.is_empty() {
+        tables += "<p>Nothing could be compared: no match lies where the truth is known.</p>";
+    }
     format!(
         "<section><h2>Against the truth</h2><p class=\"sub\">{} of {} with truth. Objects smaller than <code>regions.min_area</code> are not asked for.</p>{}<div class=\"split\">{tables}</div></section>",
         summary.scored_frames,
