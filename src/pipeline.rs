@@ -36,6 +36,8 @@ pub struct Pipeline {
     coarse_disparity: CoarseDisparity,
     attention: Image<f32>,
     matches: Matches,
+    /// Smallest and largest disparity searched, `x_l - x_r` in pixels.
+    searched: [f32; 2],
     clock: Clock,
 }
 
@@ -59,6 +61,10 @@ impl Pipeline {
             coarse_disparity: CoarseDisparity::default(),
             attention: Image::default(),
             matches: Matches::default(),
+            searched: [
+                config.stereo.min_disparity as f32,
+                (config.stereo.min_disparity + config.stereo.disparity_range - 1) as f32,
+            ],
             clock: Clock::none(),
         }
     }
@@ -107,6 +113,8 @@ impl Pipeline {
         let mut lap = Lap::start(self.clock);
 
         self.preprocess.run(frame, out, &mut self.right);
+        let offset = out.rig.disparity_offset() as f32;
+        [out.min_disparity, out.max_disparity] = self.searched.map(|d| d - offset);
         lap.mark(&mut out.times, Stage::Preprocess);
 
         self.coarse.run(&out.left, &self.right, &mut self.coarse_disparity);
@@ -178,5 +186,37 @@ impl Lap {
         let now = self.clock.now();
         times.set(stage, (now - self.last) as f64 * 1e-6);
         self.last = now;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::camera::{Camera, StereoRig};
+    use crate::image::Picture;
+    use crate::stamp::Stamp;
+
+    #[test]
+    fn the_searched_range_is_told_with_the_principal_points_subtracted() {
+        let size = Size::new(64, 48);
+        let camera = |cx, tx| Camera::pinhole(size, 60.0, cx, 24.0, tx);
+        let rig = StereoRig::new(camera(32.0, 0.0), camera(30.0, -6.0), 0.0).unwrap();
+        let rig = Arc::new(rig);
+        let frame = StereoFrame {
+            stamp: Stamp::default(),
+            right_stamp: Stamp::default(),
+            frame_id: Arc::from("left"),
+            left: Picture::Gray(Image::new(size)),
+            right: Picture::Gray(Image::new(size)),
+            rig: Arc::clone(&rig),
+        };
+        let mut config = Config::default();
+        (config.stereo.min_disparity, config.stereo.disparity_range) = (4, 16);
+        let mut pipeline = Pipeline::new(&config, size, crate::simd::detect());
+        let mut out = Perception::new(size, rig);
+        pipeline.process(&frame, &mut out);
+        assert_eq!((out.min_disparity, out.max_disparity), (2.0, 17.0));
     }
 }
