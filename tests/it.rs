@@ -24,6 +24,7 @@ mod it {
     mod report;
     mod roi;
     mod saliency;
+    mod stereo;
     mod sync;
     mod track;
     #[cfg(feature = "tool")]

@@ -25,6 +25,8 @@ pub struct Refine {
     min_confidence: f32,
     checked: Image<i16>,
     smooth: Image<i16>,
+    /// A row without any match.
+    outside: Vec<i16>,
     speckles: Speckles,
 }
 
@@ -47,6 +49,7 @@ impl Refine {
             min_confidence: config.min_confidence as f32,
             checked: Image::default(),
             smooth: Image::default(),
+            outside: Vec::new(),
             speckles: Speckles::default(),
         }
     }
@@ -71,8 +74,9 @@ impl Refine {
         for y in area.rows.clone() {
             check_row(matches, y, self.max_difference, &area, self.checked.row_mut(y));
         }
-        let (checked, smooth) = (&self.checked, &mut self.smooth);
-        dispatch!(self.level, simd => median(simd, checked, &area, smooth));
+        self.outside.resize(self.size.width, NO_MATCH);
+        let (checked, outside, smooth) = (&self.checked, &self.outside[..], &mut self.smooth);
+        dispatch!(self.level, simd => median(simd, checked, outside, &area, smooth));
         if self.speckle_size > 1 {
             self.speckles.remove(&mut self.smooth, &area, self.speckle_size, self.speckle_range);
         }
@@ -134,11 +138,17 @@ impl Area {
 }
 
 #[inline(always)]
-fn median<S: Simd>(simd: S, checked: &Image<i16>, area: &Area, smooth: &mut Image<i16>) {
-    let columns = &area.columns;
-    for y in area.rows.clone() {
-        let above = checked.row(y.max(area.rows.start + 1) - 1);
-        let below = checked.row((y + 1).min(area.rows.end - 1));
+fn median<S: Simd>(
+    simd: S,
+    checked: &Image<i16>,
+    outside: &[i16],
+    area: &Area,
+    smooth: &mut Image<i16>,
+) {
+    let (rows, columns) = (&area.rows, &area.columns);
+    for y in rows.clone() {
+        let above = if y > rows.start { checked.row(y - 1) } else { outside };
+        let below = if y + 1 < rows.end { checked.row(y + 1) } else { outside };
         median_row(
             simd,
             &above[columns.clone()],

@@ -77,12 +77,17 @@ fn median_lanes<S: Simd>(
         p[a] = low;
         p[b] = high;
     }
-    p[4].store_slice(&mut out[x..x + LANES]);
+    // Holes stay holes.
+    let median = centre.simd_eq(none).select(none, p[4]);
+    median.store_slice(&mut out[x..x + LANES]);
 }
 
 /// The median of one pixel, anywhere in the row.
 fn median_at(above: &[i16], here: &[i16], below: &[i16], x: usize) -> i16 {
     let centre = here[x];
+    if centre == NO_MATCH {
+        return NO_MATCH;
+    }
     let mut p = [centre; 9];
     for (k, row) in [above, here, below].into_iter().enumerate() {
         for column in 0..3 {

@@ -1,0 +1,413 @@
+//! Semi-global matching as its papers write it: one pixel, one path, one
+//! disparity at a time.
+
+use std::collections::HashMap;
+
+use salient_stereo::config::Config;
+use salient_stereo::image::{Image, Size};
+use salient_stereo::stage::coarse::CELL;
+use salient_stereo::stage::stereo::block::{Measure, RADIUS};
+use salient_stereo::stage::stereo::cost::MAX_COST;
+use salient_stereo::stage::stereo::engine::{Method, Settings, Views};
+use salient_stereo::stage::stereo::plan::{Band, Plan, Run};
+use salient_stereo::stage::stereo::{Matches, NO_MATCH};
+
+type Point = (isize, isize);
+
+/// Centre-symmetric census over 9x7 pixels.
+pub fn census(image: &Image<u8>, x: isize, y: isize) -> u32 {
+    let mut bits = 0;
+    for k in 0..31 {
+        let (dx, dy) = (k % 9 - 4, k / 9 - 3);
+        let a = image.get_clamped(x + dx, y + dy);
+        let b = image.get_clamped(x - dx, y - dy);
+        bits |= u32::from(a > b) << k;
+    }
+    bits
+}
+
+/// One run of one band.
+struct Domain<'a> {
+    views: &'a Views<'a>,
+    settings: &'a Settings,
+    plan: &'a Plan,
+    band: &'a Band,
+    run: &'a Run,
+    /// Census of every left and right pixel that is looked at.
+    census: HashMap<(bool, isize, isize), u32>,
+    rows: (isize, isize),
+}
+
+/// Path costs of one pixel by disparity, and their minimum.
+#[derive(Clone, Default)]
+struct State {
+    costs: HashMap<usize, u8>,
+    floor: u8,
+}
+
+impl<'a> Domain<'a> {
+    fn new(
+        views: &'a Views<'a>,
+        settings: &'a Settings,
+        plan: &'a Plan,
+        band: &'a Band,
+        run: &'a Run,
+    ) -> Self {
+        let height = views.left.height();
+        let above = settings.context.min(band.y0);
+        let below = settings.context.min(height - band.y1);
+        let rows = ((band.y0 - above) as isize, (band.y1 + below) as isize);
+        let mut census = HashMap::new();
+        let (x0, x1) = (run.x0 as isize, run.x0 as isize + 32 * run.tiles.len() as isize);
+        for y in rows.0..rows.1 {
+            for x in x0 - run.hi as isize - 40..x1 + 40 {
+                census.insert((false, x, y), super::stereo::census(views.left, x, y));
+                census.insert((true, x, y), super::stereo::census(views.right, x, y));
+            }
+        }
+        Self { views, settings, plan, band, run, census, rows }
+    }
+
+    fn columns(&self) -> (isize, isize) {
+        (self.run.x0 as isize, self.run.x0 as isize + 32 * self.run.tiles.len() as isize)
+    }
+
+    fn range(&self, x: isize) -> std::ops::Range<usize> {
+        let k = (x as usize - self.run.x0) / 32;
+        let tile = self.plan.tiles[self.run.tiles.start + k];
+        tile.lo..tile.lo + tile.n
+    }
+
+    fn cost(&self, x: isize, y: isize, d: usize) -> u8 {
+        let a = self.census[&(false, x, y)];
+        let b = self.census[&(true, x - d as isize, y)];
+        (a ^ b).count_ones() as u8
+    }
+
+    fn gray(&self, (x, y): Point) -> u8 {
+        self.views.left.get_clamped(x, y)
+    }
+
+    /// P1, P2 without an edge, and the least P2 of a pixel.
+    fn penalties(&self, (x, y): Point) -> (u8, u8, u8) {
+        let y = y.clamp(self.band.y0 as isize, self.band.y1 as isize - 1);
+        let q = self.views.weight.map_or(255, |weight| u16::from(weight.get_clamped(x, y)));
+        let scaled = |p: u8| ((u16::from(p) * q + 127) / 255) as u8;
+        let penalties = self.settings.penalties;
+        let least = penalties.p1 + (penalties.p2 - penalties.p1) / 4;
+        (scaled(penalties.p1), scaled(penalties.p2), scaled(least))
+    }
+
+    /// What is known before the first pixel of a path.
+    fn seed(&self, p: Point) -> State {
+        let mut state = State::default();
+        if let Some(coarse) = self.views.coarse {
+            let c = coarse.get_clamped(p.0 / CELL as isize, p.1 / CELL as isize);
+            if !c.is_nan() {
+                for d in self.range(p.0) {
+                    let slope =
+                        (2.0 * (c - d as f32).abs()).min(f32::from(self.settings.penalties.p2));
+                    state.costs.insert(d, slope as u8);
+                }
+            }
+        }
+        state
+    }
+
+    /// The recursion: L(p, d) from the state at `q`, whose brightness is that at `edge`.
+    fn step(&self, p: Point, edge: Point, q: &State) -> State {
+        let (p1, p2, least) = self.penalties(p);
+        let step = self.gray(p).abs_diff(self.gray(edge));
+        let p2 = p2.saturating_sub(step).max(least);
+        let before = |d: Option<usize>| {
+            let cost = d.and_then(|d| q.costs.get(&d)).copied().unwrap_or(255);
+            cost.saturating_sub(q.floor).min(p2)
+        };
+        let mut state = State { costs: HashMap::new(), floor: 255 };
+        for d in self.range(p.0) {
+            let turn = before(d.checked_sub(1)).min(before(Some(d + 1)));
+            let cost = self.cost(p.0, p.1, d) + before(Some(d)).min(turn + p1);
+            state.floor = state.floor.min(cost);
+            state.costs.insert(d, cost);
+        }
+        state
+    }
+
+    /// All states of the path that moves by `(dx, dy)`.
+    fn path(&self, dx: isize, dy: isize) -> HashMap<Point, State> {
+        let (x0, x1) = self.columns();
+        let rows = match dy {
+            0 => (self.band.y0 as isize, self.band.y1 as isize),
+            1 => (self.rows.0, self.band.y1 as isize),
+            _ => (self.band.y0 as isize, self.rows.1),
+        };
+        let mut states: HashMap<Point, State> = HashMap::new();
+        let mut points: Vec<Point> =
+            (rows.0..rows.1).flat_map(|y| (x0..x1).map(move |x| (x, y))).collect();
+        if dy < 0 || dx < 0 && dy == 0 {
+            points.reverse();
+        }
+        for p in points {
+            let q = (p.0 - dx, p.1 - dy);
+            let state = if let Some(state) = states.get(&q) {
+                self.step(p, q, state)
+            } else if dy == 0 {
+                self.step(p, p, &self.seed(p))
+            } else if q.1 < rows.0 || q.1 >= rows.1 {
+                // The first row has no row before it to measure an edge with, and
+                // paths from the sides start from what is seeded beside them.
+                let edge = (q.0, p.1);
+                let seed =
+                    if q.0 < x0 || q.0 >= x1 { State::default() } else { self.seed((q.0, p.1)) };
+                self.step(p, edge, &seed)
+            } else {
+                self.step(p, q, &State::default())
+            };
+            states.insert(p, state);
+        }
+        states
+    }
+
+    /// Summed costs by pixel and disparity, and what was subtracted.
+    fn sums(&self) -> HashMap<Point, (HashMap<usize, u8>, u16)> {
+        let (x0, x1) = self.columns();
+        let mut sums = HashMap::new();
+        let band = (self.band.y0 as isize, self.band.y1 as isize);
+        let points = || (band.0..band.1).flat_map(move |y| (x0..x1).map(move |x| (x, y)));
+        if let Method::Block(measure) = self.settings.method {
+            for p in points() {
+                let costs = self.range(p.0).map(|d| (d, self.block(measure, p, d))).collect();
+                sums.insert(p, (costs, 0));
+            }
+            return sums;
+        }
+        let diagonals = self.settings.method == Method::EightPaths;
+        let horizontal = [self.path(1, 0), self.path(-1, 0)];
+        let sweeps = [1, -1].map(|dy| {
+            let mut paths = vec![self.path(0, dy)];
+            if diagonals {
+                paths.push(self.path(1, dy));
+                paths.push(self.path(-1, dy));
+            }
+            paths
+        });
+        for p in points() {
+            let mut floors = 0;
+            let mut costs: HashMap<usize, u8> = self.range(p.0).map(|d| (d, 0)).collect();
+            for path in &horizontal {
+                let state = &path[&p];
+                floors += u16::from(state.floor);
+                for (d, sum) in &mut costs {
+                    *sum = sum.saturating_add(state.costs[d] - state.floor);
+                }
+            }
+            for paths in &sweeps {
+                let floor = paths.iter().fold(0_u8, |sum, path| sum.saturating_add(path[&p].floor));
+                floors += u16::from(floor);
+                for (d, sum) in &mut costs {
+                    let cost =
+                        paths.iter().fold(0_u8, |sum, path| sum.saturating_add(path[&p].costs[d]));
+                    *sum = sum.saturating_add(cost - floor);
+                }
+            }
+            sums.insert(p, (costs, floors));
+        }
+        sums
+    }
+
+    fn block(&self, measure: Measure, p: Point, d: usize) -> u8 {
+        let (x0, x1) = self.columns();
+        let radius = RADIUS as isize;
+        let mut sum = 0;
+        for dy in -radius..=radius {
+            for dx in -radius..=radius {
+                let x = (p.0 + dx).clamp(x0, x1 - 1);
+                let y = (p.1 + dy).clamp(self.rows.0, self.rows.1 - 1);
+                sum += u32::from(match measure {
+                    Measure::Census => self.cost(x, y, d),
+                    Measure::Absolute => {
+                        let right = self.views.right.get_clamped(x - d as isize, y);
+                        self.gray((x, y)).abs_diff(right).min(MAX_COST)
+                    }
+                });
+            }
+        }
+        let area = (2 * RADIUS as u32 + 1).pow(2);
+        ((8 * sum + area / 2) / area) as u8
+    }
+}
+
+/// What the engine must find.
+pub fn matches(views: &Views<'_>, plan: &Plan, settings: &Settings) -> Matches {
+    let size = views.left.size();
+    let mut out = Matches {
+        left: Image::filled(size, NO_MATCH),
+        right: Image::filled(size, NO_MATCH),
+        evidence: Image::new(size),
+    };
+    for band in &plan.bands {
+        let shift = if band.hi - band.lo > 512 { 2 } else { u32::from(band.hi - band.lo > 256) };
+        // Of each right pixel: the least cost and its disparity.
+        let mut right: HashMap<Point, (u8, usize)> = HashMap::new();
+        for run in &plan.runs[band.runs.clone()] {
+            let domain = Domain::new(views, settings, plan, band, run);
+            let sums = domain.sums();
+            for y in band.y0..band.y1 {
+                for x in run.x0..(run.x0 + 32 * run.tiles.len()).min(size.width) {
+                    let p = (x as isize, y as isize);
+                    let (costs, floors) = &sums[&p];
+                    let range = domain.range(p.0);
+                    if views.mask.is_none_or(|mask| mask.get(x, y) != 0) {
+                        if let Some((d, evidence)) =
+                            winner(costs, &range, u32::from(*floors), settings.uniqueness_ratio)
+                        {
+                            out.left.set(x, y, d);
+                            out.evidence.set(x, y, evidence);
+                        }
+                    }
+                }
+                // Tile by tile, and in a tile by growing disparity, as ties go
+                // to the first.
+                for k in 0..run.tiles.len() {
+                    for d in domain.range((run.x0 + 32 * k) as isize) {
+                        for lane in 0..32 {
+                            let x = run.x0 + 32 * k + lane;
+                            if x >= size.width {
+                                continue;
+                            }
+                            let q = (x as isize - d as isize, y as isize);
+                            let cost = sums[&(x as isize, y as isize)].0[&d];
+                            let best = right.entry(q).or_insert((255, 0));
+                            if cost < best.0 {
+                                *best = (cost, d);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        for ((x, y), (cost, d)) in right {
+            if x >= 0 && cost < 255 {
+                let d = (((d - band.lo) >> shift) << shift) + band.lo;
+                out.right.set(x as usize, y as usize, (32 * d) as i16);
+            }
+        }
+    }
+    out
+}
+
+/// Disparity in 1/32 px and evidence.
+fn winner(
+    costs: &HashMap<usize, u8>,
+    range: &std::ops::Range<usize>,
+    floors: u32,
+    uniqueness_ratio: u32,
+) -> Option<(i16, u8)> {
+    let best = range.clone().min_by_key(|d| costs[d])?;
+    let c0 = costs[&best];
+    if c0 == 255 {
+        return None;
+    }
+    // Long ranges are looked at in steps of two or four.
+    let step = if range.len() > 512 { 4 } else { 1 + usize::from(range.len() > 256) };
+    let bin = |d: usize| (d - range.start) / step;
+    let second = range
+        .clone()
+        .filter(|&d| bin(d).abs_diff(bin(best)) > 1)
+        .map(|d| costs[&d])
+        .min()
+        .unwrap_or(255);
+    let (first, second) = (u32::from(c0) + floors, u32::from(second) + floors);
+    let evidence = if 100 * second < (100 + uniqueness_ratio) * first {
+        0
+    } else {
+        (255 * (second - first) / second.max(1)).clamp(1, 255) as u8
+    };
+    let cost =
+        |d: Option<usize>| d.and_then(|d| costs.get(&d)).copied().map_or(f64::from(c0), f64::from);
+    let (a, b) = (cost(best.checked_sub(1)), cost(Some(best + 1)));
+    let rise = a.max(b) - f64::from(c0);
+    let offset = if rise > 0.0 { (32.0 * (a - b) / (2.0 * rise)).round() } else { 0.0 };
+    Some((32 * best as i16 + offset as i16, evidence))
+}
+
+/// Left-right check, median and speckle filter; pixels in px, NaN where none.
+pub fn refined(matches: &Matches, config: &Config) -> Image<f32> {
+    let size = matches.left.size();
+    let checked = Image::from_fn(size, |x, y| {
+        let d = matches.left.get(x, y);
+        if d == NO_MATCH || config.stereo.disp12_max_diff < 0 {
+            return d;
+        }
+        let partner = x as f64 - (f64::from(d) / 32.0 + 0.5).floor();
+        if partner < 0.0 {
+            return d;
+        }
+        let right = matches.right.get((partner as usize).min(size.width - 1), y);
+        let difference = (f64::from(right) - f64::from(d)).abs() / 32.0;
+        if difference <= config.stereo.disp12_max_diff as f64 + 0.5 { d } else { NO_MATCH }
+    });
+    let smooth = Image::from_fn(size, |x, y| {
+        let centre = checked.get(x, y);
+        if centre == NO_MATCH {
+            return NO_MATCH;
+        }
+        let mut window = Vec::new();
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                let (x, y) = (x as isize + dx, y as isize + dy);
+                let inside =
+                    x >= 0 && y >= 0 && (x as usize) < size.width && (y as usize) < size.height;
+                let d = if inside { checked.get(x as usize, y as usize) } else { NO_MATCH };
+                window.push(if d == NO_MATCH { centre } else { d });
+            }
+        }
+        window.sort_unstable();
+        window[4]
+    });
+    let patches = patches(&smooth, (config.stereo.speckle_range * 32.0) as i32);
+    let least = config.stereo.speckle_size as usize;
+    Image::from_fn(size, |x, y| {
+        let d = smooth.get(x, y);
+        if d == NO_MATCH || patches.get(x, y) < least { f32::NAN } else { f32::from(d) / 32.0 }
+    })
+}
+
+/// Size of the patch around each pixel, by flooding it.
+fn patches(image: &Image<i16>, range: i32) -> Image<usize> {
+    let size: Size = image.size();
+    let mut out = Image::filled(size, 0_usize);
+    for y in 0..size.height {
+        for x in 0..size.width {
+            if image.get(x, y) == NO_MATCH || out.get(x, y) != 0 {
+                continue;
+            }
+            let mut patch = vec![(x, y)];
+            out.set(x, y, 1);
+            let mut next = 0;
+            while let Some(&(px, py)) = patch.get(next) {
+                next += 1;
+                let here = i32::from(image.get(px, py));
+                for (dx, dy) in [(1_isize, 0_isize), (-1, 0), (0, 1), (0, -1)] {
+                    let (qx, qy) = (px as isize + dx, py as isize + dy);
+                    if qx < 0 || qy < 0 || qx >= size.width as isize || qy >= size.height as isize {
+                        continue;
+                    }
+                    let q = (qx as usize, qy as usize);
+                    let there = image.get(q.0, q.1);
+                    if there != NO_MATCH
+                        && out.get(q.0, q.1) == 0
+                        && (i32::from(there) - here).abs() <= range
+                    {
+                        out.set(q.0, q.1, 1);
+                        patch.push(q);
+                    }
+                }
+            }
+            for &(px, py) in &patch {
+                out.set(px, py, patch.len());
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,367 @@
+//! The matcher against its plain reference, at every instruction set.
+
+use std::ops::Range;
+
+use proptest::prelude::*;
+use salient_stereo::camera::{Camera, StereoRig};
+use salient_stereo::config::Config;
+use salient_stereo::image::{Image, Size};
+use salient_stereo::perception::{RoiMask, View};
+use salient_stereo::simd::{self, Level};
+use salient_stereo::stage::coarse::{CELL, Coarse, CoarseDisparity, shrink};
+use salient_stereo::stage::refine::Refine;
+use salient_stereo::stage::stereo::block::Measure;
+use salient_stereo::stage::stereo::cost::Penalties;
+use salient_stereo::stage::stereo::engine::{Engine, Method, Settings, Views};
+use salient_stereo::stage::stereo::plan::Plan;
+use salient_stereo::stage::stereo::{Matches, NO_MATCH, Stereo};
+
+use super::reference::{Noise, ODD_SIZES, stereo as plain};
+
+const METHODS: [Method; 4] = [
+    Method::EightPaths,
+    Method::FourPaths,
+    Method::Block(Measure::Census),
+    Method::Block(Measure::Absolute),
+];
+
+/// A textured pair: the right view is the left one moved by a disparity that
+/// changes from patch to patch.
+fn pair(size: Size, seed: u64) -> (Image<u8>, Image<u8>) {
+    let mut noise = Noise(seed);
+    let left = Image::from_fn(size, |_, _| (noise.next() >> 56) as u8);
+    let patches: Vec<usize> = (0..64).map(|_| (noise.next() % 12) as usize).collect();
+    let right = Image::from_fn(size, |x, y| {
+        let d = patches[(x / 9 + 7 * (y / 11)) % 64];
+        left.get((x + d).min(size.width - 1), y)
+    });
+    (left, right)
+}
+
+fn coarse_of(size: Size, seed: u64) -> Image<f32> {
+    let mut noise = Noise(seed);
+    Image::from_fn(size.divided_by(CELL), |_, _| {
+        if noise.next() % 4 == 0 { f32::NAN } else { (noise.next() % 14) as f32 }
+    })
+}
+
+fn settings(method: Method, search: Range<usize>) -> Settings {
+    Settings {
+        penalties: Penalties { p1: 7, p2: 40 },
+        method,
+        context: 3,
+        uniqueness_ratio: 5,
+        search,
+    }
+}
+
+fn assert_same(found: &Matches, expected: &Matches, what: &str) {
+    for y in 0..expected.left.height() {
+        assert_eq!(found.left.row(y), expected.left.row(y), "left row {y}: {what}");
+        assert_eq!(found.right.row(y), expected.right.row(y), "right row {y}: {what}");
+        assert_eq!(found.evidence.row(y), expected.evidence.row(y), "evidence row {y}: {what}");
+    }
+}
+
+fn compare(views: &Views<'_>, plan: &Plan, settings: &Settings, levels: &[Level]) {
+    let expected = plain::matches(views, plan, settings);
+    for &level in levels {
+        let mut found = Matches::default();
+        Engine::new(settings.clone(), level).run(views, plan, &mut found);
+        assert_same(&found, &expected, &format!("{level:?} {settings:?}"));
+    }
+}
+
+#[test]
+fn every_method_equals_its_reference_at_every_level_and_odd_size() {
+    let levels = simd::available();
+    for (i, size) in ODD_SIZES.into_iter().enumerate() {
+        let (left, right) = pair(size, i as u64);
+        let coarse = coarse_of(size, 99 + i as u64);
+        let mut noise = Noise(5);
+        let weight = Image::from_fn(size, |_, _| 100 + (noise.next() % 156) as u8);
+        for method in METHODS {
+            let settings = settings(method, 2..18);
+            let mut plan = Plan::default();
+            plan.whole(size, &settings.search);
+            let views =
+                Views { left: &left, right: &right, mask: None, coarse: None, weight: None };
+            compare(&views, &plan, &settings, &levels);
+            let views = Views { coarse: Some(&coarse), weight: Some(&weight), ..views };
+            compare(&views, &plan, &settings, &levels);
+        }
+    }
+}
+
+#[test]
+fn ranges_beyond_a_byte_equal_the_reference() {
+    let size = Size::new(70, 34);
+    let (left, right) = pair(size, 3);
+    let views = Views { left: &left, right: &right, mask: None, coarse: None, weight: None };
+    for search in [0..300, 511..1023] {
+        let settings = settings(Method::EightPaths, search);
+        let mut plan = Plan::default();
+        plan.whole(size, &settings.search);
+        compare(&views, &plan, &settings, &[simd::detect()]);
+    }
+}
+
+#[test]
+fn degenerate_regions_equal_the_reference() {
+    let size = Size::new(131, 77);
+    let (left, right) = pair(size, 8);
+    let coarse = coarse_of(size, 4);
+    let regions: [(&str, fn(usize, usize) -> bool); 6] = [
+        ("empty", |_, _| false),
+        ("one pixel", |x, y| (x, y) == (60, 40)),
+        ("last pixel", |x, y| (x, y) == (130, 76)),
+        ("one row", |_, y| y == 33),
+        ("one column", |x, _| x == 130),
+        ("two far apart", |x, y| y > 20 && y < 30 && !(10..110).contains(&x)),
+    ];
+    for (name, inside) in regions {
+        let mask = Image::from_fn(size, |x, y| if inside(x, y) { 255 } else { 0 });
+        for method in METHODS {
+            let settings = settings(method, 0..16);
+            let mut plan = Plan::default();
+            plan.of_mask(&mask, 0.1, Some(&coarse), &settings.search);
+            let views = Views {
+                left: &left,
+                right: &right,
+                mask: Some(&mask),
+                coarse: Some(&coarse),
+                weight: None,
+            };
+            compare(&views, &plan, &settings, &simd::available());
+            let mut found = Matches::default();
+            Engine::new(settings, simd::detect()).run(&views, &plan, &mut found);
+            for (d, m) in found.left.pixels().iter().zip(mask.pixels()) {
+                assert!(*m != 0 || *d == NO_MATCH, "{name}: a match outside the region");
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn random_masks_equal_the_reference(
+        width in 1_usize..150,
+        height in 1_usize..80,
+        seed: u64,
+        rarity in 1_u64..400,
+        p1 in 0_u8..=100,
+        more in 0_u8..=100,
+        context in 0_usize..10,
+    ) {
+        let size = Size::new(width, height);
+        let (left, right) = pair(size, seed);
+        let coarse = coarse_of(size, seed ^ 1);
+        let mut noise = Noise(seed ^ 2);
+        let mask = Image::from_fn(size, |_, _| if noise.next() % rarity == 0 { 255 } else { 0 });
+        let settings = Settings {
+            penalties: Penalties { p1, p2: p1.saturating_add(more).min(100) },
+            context,
+            ..settings(Method::EightPaths, 0..24)
+        };
+        let mut plan = Plan::default();
+        plan.of_mask(&mask, 0.1, Some(&coarse), &settings.search);
+        let views = Views {
+            left: &left,
+            right: &right,
+            mask: Some(&mask),
+            coarse: Some(&coarse),
+            weight: None,
+        };
+        compare(&views, &plan, &settings, &[simd::detect()]);
+    }
+
+    #[test]
+    fn refinement_equals_its_reference(
+        width in 1_usize..90,
+        height in 1_usize..50,
+        seed: u64,
+        speckle_size in 0_i64..40,
+        max_difference in -1_i64..3,
+    ) {
+        let size = Size::new(width, height);
+        let matches = random_matches(size, seed);
+        let mut noise = Noise(seed ^ 7);
+        let (x0, y0) = (noise.next() as usize % width, noise.next() as usize % height);
+        let matched = Image::from_fn(size, |x, y| if x >= x0 && y >= y0 { 255 } else { 0 });
+        let mut matches = matches;
+        for (d, &m) in matches.left.pixels_mut().iter_mut().zip(matched.pixels()) {
+            if m == 0 {
+                *d = NO_MATCH;
+            }
+        }
+        let mut config = Config::default();
+        config.stereo.speckle_size = speckle_size;
+        config.stereo.disp12_max_diff = max_difference;
+        config.min_confidence = 0.5;
+        let expected = plain::refined(&matches, &config);
+        for level in simd::available() {
+            let mut refine = Refine::with_level(&config, size, level);
+            let roi = RoiMask { salient: matched.clone(), matched: matched.clone(), fraction: 0.5 };
+            let (mut disparity, mut confidence) = (Image::default(), Image::default());
+            refine.run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
+            for ((d, c), e) in
+                disparity.pixels().iter().zip(confidence.pixels()).zip(expected.pixels())
+            {
+                // The rig's principal points are 2 px apart.
+                let e = if *c < 0.5 { f32::NAN } else { *e - 2.0 };
+                prop_assert!(*d == e || (d.is_nan() && e.is_nan()), "{d} {e}");
+                prop_assert_eq!(*c == 0.0, d.is_nan());
+            }
+        }
+    }
+}
+
+fn random_matches(size: Size, seed: u64) -> Matches {
+    let mut noise = Noise(seed);
+    let mut image = || {
+        let mut last = 100;
+        Image::from_fn(size, |_, _| {
+            match noise.next() % 9 {
+                0 => return NO_MATCH,
+                1 => last = (noise.next() % 400) as i16,
+                _ => last += (noise.next() % 21) as i16 - 10,
+            }
+            last
+        })
+    };
+    Matches { left: image(), right: image(), evidence: Image::filled(size, 128) }
+}
+
+fn rig(size: Size) -> StereoRig {
+    StereoRig::new(
+        Camera::pinhole(size, 400.0, 52.0, 20.0, 0.0),
+        Camera::pinhole(size, 400.0, 50.0, 20.0, -200.0),
+        0.0,
+    )
+    .unwrap()
+}
+
+/// A plane before a background, with its true disparities 40 and 12.
+fn scene(size: Size) -> (View, View, Image<f32>) {
+    let mut noise = Noise(11);
+    let texture =
+        Image::from_fn(Size::new(size.width + 80, size.height), |_, _| (noise.next() >> 56) as u8);
+    // 3x3 means leave detail that survives the quarter size.
+    let smooth = Image::from_fn(texture.size(), |x, y| {
+        let mut sum = 0_u32;
+        for (dx, dy) in (-2..=2).flat_map(|dx| (-2..=2).map(move |dy| (dx, dy))) {
+            sum += u32::from(texture.get_clamped(x as isize + dx, y as isize + dy));
+        }
+        (((sum / 25) as i32 - 127) * 3 + 127).clamp(0, 255) as u8
+    });
+    let near = |x: usize, y: usize| {
+        (size.width / 3..size.width / 2 + 40).contains(&x)
+            && (size.height / 4..3 * size.height / 4).contains(&y)
+    };
+    let truth = Image::from_fn(size, |x, y| if near(x, y) { 40.0 } else { 12.0 });
+    let left = Image::from_fn(size, |x, y| {
+        if near(x, y) { smooth.get(x, size.height - 1 - y) } else { smooth.get(x, y) }
+    });
+    let right = Image::from_fn(size, |x, y| {
+        if near(x + 40, y) {
+            smooth.get(x + 40, size.height - 1 - y)
+        } else {
+            smooth.get(x + 12, y)
+        }
+    });
+    let view = |gray| View { gray, ..View::default() };
+    (view(left), view(right), truth)
+}
+
+#[test]
+fn a_plane_before_a_background_is_found_to_a_fraction_of_a_pixel() {
+    let size = Size::new(360, 150);
+    let (left, right, truth) = scene(size);
+    for algorithm in ["semi_global", "block", "census_block"] {
+        let config = Config::default().with("stereo.algorithm", &algorithm.into()).unwrap();
+        let level = simd::detect();
+        let mut coarse = CoarseDisparity::default();
+        Coarse::new(&config, size, level).run(&left, &right, &mut coarse);
+        assert!(coarse.filled.pixels().iter().all(|d| !d.is_nan()));
+        let everything = Image::filled(size, 255);
+        let roi = RoiMask { salient: everything.clone(), matched: everything, fraction: 1.0 };
+        let mut matches = Matches::default();
+        let saliency = Image::filled(size, 1.0);
+        Stereo::new(&config, size, level).run(
+            &left,
+            &right,
+            &roi,
+            &saliency,
+            &coarse,
+            &mut matches,
+        );
+        let (mut disparity, mut confidence) = (Image::default(), Image::default());
+        Refine::new(&config, size).run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
+        let (mut valid, mut wrong) = (0, 0);
+        for y in 8..size.height - 8 {
+            for x in 60..size.width - 8 {
+                let d = disparity.get(x, y) + 2.0;
+                if !d.is_nan() {
+                    valid += 1;
+                    wrong += usize::from((d - truth.get(x, y)).abs() > 1.0);
+                }
+            }
+        }
+        let all = (size.height - 16) * (size.width - 68);
+        assert!(10 * valid > 8 * all, "{algorithm}: {valid} of {all} valid");
+        assert!(50 * wrong < valid, "{algorithm}: {wrong} of {valid} wrong");
+    }
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_matches() {
+    let size = Size::new(300, 170);
+    let (left, right, _) = scene(size);
+    let config = Config::default();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut coarse = CoarseDisparity::default();
+            Coarse::new(&config, size, simd::detect()).run(&left, &right, &mut coarse);
+            let matched =
+                Image::from_fn(size, |x, y| if (x / 50 + y / 50) % 2 == 0 { 255 } else { 0 });
+            let roi = RoiMask { salient: matched.clone(), matched, fraction: 0.5 };
+            let mut matches = Matches::default();
+            let saliency = Image::filled(size, 1.0);
+            Stereo::new(&config, size, simd::detect()).run(
+                &left,
+                &right,
+                &roi,
+                &saliency,
+                &coarse,
+                &mut matches,
+            );
+            (coarse.filled, matches)
+        })
+    };
+    let (one, two) = (run(1), run(2));
+    assert_eq!(one.0, two.0);
+    assert_same(&two.1, &one.1, "two threads");
+}
+
+#[test]
+fn cells_are_means_and_repeat_the_border() {
+    for (i, size) in ODD_SIZES.into_iter().enumerate() {
+        let (image, _) = pair(size, i as u64);
+        let mut cells = Image::default();
+        shrink(&image, &mut cells);
+        assert_eq!(cells.size(), size.divided_by(CELL));
+        for y in 0..cells.height() {
+            for x in 0..cells.width() {
+                let mut sum = 0;
+                for k in 0..CELL * CELL {
+                    let (px, py) = (x * CELL + k % CELL, y * CELL + k / CELL);
+                    sum += u32::from(image.get_clamped(px as isize, py as isize));
+                }
+                assert_eq!(u32::from(cells.get(x, y)), (sum + 8) / 16, "{size} {x} {y}");
+            }
+        }
+    }
+}
