@@ -2,11 +2,8 @@
 
 use std::process::ExitCode;
 
-use salient_stereo::command::node::{NodeArgs, run};
+use salient_stereo::command::node::{NodeArgs, run_to_exit};
 
 fn main() -> ExitCode {
-    run(&NodeArgs::of_process()).unwrap_or_else(|error| {
-        eprintln!("salient_stereo_node: {error}");
-        ExitCode::from(if error.is_usage() { 2 } else { 1 })
-    })
+    run_to_exit(&NodeArgs::of_process())
 }

@@ -55,6 +55,14 @@ impl NodeCommandError {
     }
 }
 
+/// Runs the node and turns its end into the exit code of the process.
+pub fn run_to_exit(args: &NodeArgs) -> ExitCode {
+    run(args).unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        ExitCode::from(if error.is_usage() { 2 } else { 1 })
+    })
+}
+
 /// Runs the node until SIGINT or SIGTERM; a second signal ends the process at once.
 ///
 /// # Errors

@@ -167,6 +167,16 @@ impl Rejections {
     }
 }
 
+impl std::ops::AddAssign for Rejections {
+    fn add_assign(&mut self, other: Self) {
+        self.small_area += other.small_area;
+        self.low_confidence += other.low_confidence;
+        self.inconsistent_depth += other.inconsistent_depth;
+        self.unstable += other.unstable;
+        self.over_count += other.over_count;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
