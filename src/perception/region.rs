@@ -20,7 +20,7 @@ pub enum TrackState {
 /// One salient region: the fields of `salient_stereo_msgs/SalientRegion`.
 ///
 /// A quantity without a valid measurement is NaN.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Region {
     /// Value of its pixels in the label image: 1..N.
     pub label: u16,
@@ -75,6 +75,22 @@ pub struct Region {
     pub extent: [f64; 3],
     /// Velocity relative to the camera, metres per second; NaN until the track is active.
     pub velocity: [f64; 3],
+}
+
+impl Clone for Region {
+    fn clone(&self) -> Self {
+        Self { contour: self.contour.clone(), mask: self.mask.clone(), ..*self }
+    }
+
+    /// Keeps the buffers, so that a track's memory of its last region is
+    /// renewed without an allocation.
+    fn clone_from(&mut self, source: &Self) {
+        let (mut contour, mut mask) =
+            (std::mem::take(&mut self.contour), std::mem::take(&mut self.mask));
+        contour.clone_from(&source.contour);
+        mask.clone_from(&source.mask);
+        *self = Self { contour, mask, ..*source };
+    }
 }
 
 /// A list of regions that keeps the buffers of removed ones for the next frame,

@@ -1,0 +1,132 @@
+//! `Pipeline::process` allocates nothing once its buffers are warm, in every
+//! saliency mode and with every matcher. A test binary of its own: the counting
+//! allocator sees the whole process, so nothing else may run beside it.
+
+use std::alloc::System;
+use std::sync::Arc;
+
+use salient_stereo::camera::{Camera, StereoRig};
+use salient_stereo::config::Config;
+use salient_stereo::drive::worker_pool;
+use salient_stereo::image::{Image, Picture, Size};
+use salient_stereo::perception::{Perception, StereoFrame};
+use salient_stereo::pipeline::Pipeline;
+use salient_stereo::simd;
+use salient_stereo::stamp::Stamp;
+use serde_json::json;
+use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+
+#[global_allocator]
+static GLOBAL: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+const SIZE: Size = Size::new(320, 160);
+/// Rounds through all frames within which every buffer must have grown.
+const MOST_ROUNDS: usize = 12;
+/// Rounds without any allocation that end the test.
+const QUIET_ROUNDS: usize = 4;
+
+/// Noise that depends on the place alone, so that both views can show it.
+fn texture(x: usize, y: usize, seed: u32) -> u8 {
+    let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77) ^ seed;
+    h ^= h >> 15;
+    h = h.wrapping_mul(0x2C1B_3C6D);
+    h ^= h >> 12;
+    (h >> 24) as u8
+}
+
+/// A far, dull background and three bright boxes that move and come nearer.
+fn frame(index: usize, rig: &Arc<StereoRig>) -> StereoFrame {
+    let view = |is_right: bool| {
+        Image::from_fn(SIZE, |x, y| {
+            for (k, (x0, y0)) in [(40, 40), (130, 60), (230, 50)].into_iter().enumerate() {
+                let disparity = 12 + 6 * k + index % 4;
+                let shift = if is_right { disparity } else { 0 };
+                let (bx, by) = (x0 + 2 * index, y0 + index);
+                if (bx..bx + 40).contains(&(x + shift)) && (by..by + 40).contains(&y) {
+                    let v = texture(x + shift - bx, y - by, k as u32);
+                    return [200_u8.saturating_add(v / 5), v / 2, 30 * k as u8];
+                }
+            }
+            let shift = if is_right { 3 } else { 0 };
+            let v = 60 + texture(x + shift, y, 99) / 8;
+            [v, v, v]
+        })
+    };
+    StereoFrame {
+        stamp: Stamp(1_000_000_000 + 100_000_000 * index as i64),
+        right_stamp: Stamp(1_000_000_000 + 100_000_000 * index as i64),
+        frame_id: Arc::from("left_optical"),
+        left: Picture::Rgb(view(false)),
+        right: Picture::Rgb(view(true)),
+        rig: Arc::clone(rig),
+    }
+}
+
+#[test]
+fn a_warm_pipeline_allocates_nothing() {
+    let rig = Arc::new(
+        StereoRig::new(
+            Camera::pinhole(SIZE, 300.0, 160.0, 80.0, 0.0),
+            Camera::pinhole(SIZE, 300.0, 160.0, 80.0, -60.0),
+            0.0,
+        )
+        .unwrap(),
+    );
+    let frames: Vec<_> = (0..12).map(|i| frame(i, &rig)).collect();
+
+    let modes = ["scene", "paper", "frequency_tuned", "spectral_residual", "full_frame"];
+    let mut variants: Vec<_> = modes.iter().map(|m| vec![("saliency.mode", json!(m))]).collect();
+    for algorithm in ["block", "census_block"] {
+        variants.push(vec![("stereo.algorithm", json!(algorithm))]);
+    }
+    variants.push(vec![
+        ("preprocess.scale", json!(2)),
+        ("preprocess.denoise", json!("median3")),
+        ("preprocess.illumination", json!("clahe")),
+        ("saliency.threshold_mode", json!("otsu")),
+        ("roi.max_fraction", json!(0.5)),
+    ]);
+    variants.push(vec![("rectify", json!(true)), ("stereo.saliency_weight", json!(1.0))]);
+
+    let mut regions_seen = 0;
+    for variant in variants {
+        let config = Config::default()
+            .with_all([("saliency.threshold", json!(0.3)), ("stereo.disparity_range", json!(64))])
+            .and_then(|c| c.with_all(variant.clone()))
+            .unwrap();
+        let pool = worker_pool(2).unwrap();
+        let mut pipeline = Pipeline::new(&config, SIZE, simd::detect());
+        let mut perception = Perception::new(pipeline.output_size(), Arc::clone(&rig));
+        let rounds = pool.install(|| {
+            // Buffers wander between regions: it takes some rounds until each
+            // has met the largest region it will hold.
+            let mut quiet_rounds = 0;
+            let mut allocated = 0;
+            for round in 0..MOST_ROUNDS {
+                pipeline.reset();
+                let before = Region::new(GLOBAL);
+                for frame in &frames {
+                    pipeline.process(frame, &mut perception);
+                }
+                let change = before.change();
+                allocated = change.allocations + change.reallocations;
+                quiet_rounds = if allocated == 0 { quiet_rounds + 1 } else { 0 };
+                if round == 0 {
+                    regions_seen += perception.regions.len();
+                }
+                if quiet_rounds == QUIET_ROUNDS {
+                    break;
+                }
+            }
+            (quiet_rounds, allocated)
+        });
+        let (quiet_rounds, allocated) = rounds;
+        assert_eq!(
+            quiet_rounds,
+            QUIET_ROUNDS,
+            "{allocated} allocations in the last {} frames with {variant:?}",
+            frames.len()
+        );
+    }
+    assert!(regions_seen > 0, "the scene has regions to allocate for");
+}
