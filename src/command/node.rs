@@ -15,6 +15,19 @@ use crate::ros::environment::{Environment, EnvironmentError};
 use crate::ros::log;
 use crate::ros::runtime::{NodeOptions, NodeRuntime, RuntimeError};
 
+const HELP: &str = "\
+The salient_stereo node: stereo images in, salient regions with their distance out.
+
+Usage: salient_stereo_node [--ros-args ARGUMENTS… [--]]
+
+  -r, --remap FROM:=TO          rename a topic, a service, __ns or __node
+  -p, --param NAME:=VALUE       set a parameter
+      --params-file FILE        set the parameters of a YAML file (config/*.yaml)
+      --log-level [LOGGER:=]LEVEL
+      --enable-rosout-logs, --disable-rosout-logs, --enable-stdout-logs, --disable-stdout-logs
+
+Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RMW_IMPLEMENTATION";
+
 /// The command line behind `node`.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct NodeArgs {
@@ -69,6 +82,10 @@ pub fn run_to_exit(args: &NodeArgs) -> ExitCode {
 /// When arguments, environment or the graph keep it from starting.
 pub fn run(args: &NodeArgs) -> Result<ExitCode, NodeCommandError> {
     let (ros, rest) = RosArgs::split(args.arguments.iter().cloned())?;
+    if rest.iter().any(|argument| argument == "--help" || argument == "-h") {
+        println!("{HELP}");
+        return Ok(ExitCode::SUCCESS);
+    }
     let names = ros.names("/", NODE_NAME)?;
     let (config, warnings) = ros.config(&Config::default(), &names)?;
     let environment = Environment::of_process()?;

@@ -91,13 +91,13 @@ pub struct LiveInput {
 }
 
 enum Infos {
-    Topic(Subscription<CameraInfo>),
+    Topic(Box<Subscription<CameraInfo>>),
     File(Arc<CameraInfo>),
 }
 
 enum Arrival {
     Image(Side, ReadResult<ImageMessage>),
-    Info(Side, ReadResult<CameraInfo>),
+    Info(Side, ReadResult<Box<CameraInfo>>),
 }
 
 impl LiveInput {
@@ -158,7 +158,9 @@ impl LiveInput {
                 Infos::Topic(topic) => arrivals.push(
                     topic
                         .async_stream()
-                        .map(move |received| Arrival::Info(side, received.map(|(info, _)| info)))
+                        .map(move |received| {
+                            Arrival::Info(side, received.map(|(info, _)| Box::new(info)))
+                        })
                         .boxed(),
                 ),
                 Infos::File(info) => sync.fix_info(side, Arc::clone(info)),
@@ -169,14 +171,10 @@ impl LiveInput {
         // builds the rig sees by the pointer that nothing has changed.
         let mut shared: [Option<Arc<CameraInfo>>; 2] = [None, None];
         loop {
-            let arrival = match select(stop, arrivals.next()).await {
-                Either::Left(_) => return,
-                Either::Right((Some(arrival), unused)) => {
-                    stop = unused;
-                    arrival
-                }
-                Either::Right((None, _)) => return,
+            let Either::Right((Some(arrival), unused)) = select(stop, arrivals.next()).await else {
+                return;
             };
+            stop = unused;
             if store.generation() != generation {
                 generation = store.generation();
                 sync.set(Settings::new(&store.config()));
@@ -188,7 +186,7 @@ impl LiveInput {
                 }
                 Arrival::Info(side, Ok(info)) => {
                     let stamp = info.header.stamp.into();
-                    sync.push_info(side, stamp, share(&mut shared[side as usize], info));
+                    sync.push_info(side, stamp, share(&mut shared[side as usize], *info));
                 }
                 Arrival::Image(side, Err(error)) => {
                     status.drop_frame(format!("{} image not decodable: {error}", side.name()));
@@ -260,7 +258,7 @@ fn infos(
 ) -> Result<Infos, LiveInputError> {
     if url.is_empty() {
         let topic = node.names().topic(&format!("{}/camera_info", side.name()))?;
-        return Ok(Infos::Topic(listed(node, topic, topics)?));
+        return Ok(Infos::Topic(Box::new(listed(node, topic, topics)?)));
     }
     let info = camera_info_from_url(url)
         .map_err(|source| LiveInputError::Calibration { side: side.name(), source })?;

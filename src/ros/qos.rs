@@ -1,4 +1,4 @@
-//! Quality of service of every topic, with the resource limits that RustDDS
+//! Quality of service of every topic, with the resource limits that `RustDDS`
 //! needs: without them a reader keeps 64 samples of a topic and a reliable
 //! writer up to 8192 unacknowledged ones, which is gigabytes of images.
 

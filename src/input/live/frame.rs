@@ -62,13 +62,12 @@ impl FrameBuilder {
         pair: &LivePair,
         baseline_override: f64,
     ) -> Result<StereoFrame, FrameError> {
-        let (left, right) = match &pair.right {
-            Some(right) => (decode("left", &pair.left)?, decode("right", right)?),
-            None => {
-                let both = decode("side-by-side", &pair.left)?;
-                split_side_by_side(&both)
-                    .map_err(|source| FrameError::Image { side: "side-by-side", source })?
-            }
+        let (left, right) = if let Some(right) = &pair.right {
+            (decode("left", &pair.left)?, decode("right", right)?)
+        } else {
+            let both = decode("side-by-side", &pair.left)?;
+            split_side_by_side(&both)
+                .map_err(|source| FrameError::Image { side: "side-by-side", source })?
         };
         let size = common_size(&left, &right).map_err(FrameError::Pair)?;
         let rig = self.rig([&pair.left_info, &pair.right_info], size, baseline_override)?;

@@ -51,25 +51,44 @@ struct Received {
 struct Draft {
     level: u8,
     message: String,
+    /// The part of the message that nobody else logs.
+    news: String,
     values: Vec<KeyValue>,
 }
 
 impl Draft {
     fn new() -> Self {
-        Self { level: DiagnosticStatus::OK, message: String::new(), values: Vec::new() }
+        Self {
+            level: DiagnosticStatus::OK,
+            message: String::new(),
+            news: String::new(),
+            values: Vec::new(),
+        }
     }
 
+    /// Says what is wrong; logged when the status becomes worse.
     fn say(&mut self, level: u8, message: impl Display) {
+        let message = message.to_string();
+        append(&mut self.news, &message);
+        self.say_again(level, message);
+    }
+
+    /// Says what another place has logged already.
+    fn say_again(&mut self, level: u8, message: impl Display) {
         self.level = self.level.max(level);
-        if !self.message.is_empty() {
-            self.message.push_str("; ");
-        }
-        self.message.push_str(&message.to_string());
+        append(&mut self.message, &message.to_string());
     }
 
     fn value(&mut self, key: impl Into<String>, value: impl Display) {
         self.values.push(KeyValue { key: key.into(), value: value.to_string() });
     }
+}
+
+fn append(text: &mut String, sentence: &str) {
+    if !text.is_empty() {
+        text.push_str("; ");
+    }
+    text.push_str(sentence);
 }
 
 impl Reporter {
@@ -135,7 +154,7 @@ impl Reporter {
             input.say(DiagnosticStatus::WARN, text);
         }
         if totals.dropped.values().sum::<u64>() > before.dropped.values().sum() {
-            input.say(DiagnosticStatus::WARN, "frames were dropped, see the reasons below");
+            input.say_again(DiagnosticStatus::WARN, "frames were dropped, see the reasons below");
         }
         input.value("pairs", totals.paired);
         input.value("pair rate (Hz)", rate(totals.paired, before.paired));
@@ -173,7 +192,7 @@ impl Reporter {
                 }
             }
             Some(Ok(text)) => calibration.value("rig", text),
-            Some(Err(text)) => calibration.say(DiagnosticStatus::ERROR, text),
+            Some(Err(text)) => calibration.say_again(DiagnosticStatus::ERROR, text),
         }
 
         // Processing.
@@ -188,7 +207,7 @@ impl Reporter {
         if let Some(bytes) = around.receive_buffer_bytes {
             transport.value("receive buffer (bytes)", bytes);
             if let Some(advice) = receive_buffer_advice(bytes) {
-                transport.say(DiagnosticStatus::WARN, advice);
+                transport.say_again(DiagnosticStatus::WARN, advice);
             }
         }
         if let Some(errors) = around.receive_buffer_errors {
@@ -233,8 +252,8 @@ impl Reporter {
             status: Vec::with_capacity(drafts.len()),
         };
         for (level, (name, draft)) in self.levels.iter_mut().zip(drafts) {
-            if draft.level > *level {
-                tracing::warn!("{name}: {}", draft.message);
+            if draft.level > *level && !draft.news.is_empty() {
+                tracing::warn!("{name}: {}", draft.news);
             }
             *level = draft.level;
             message.status.push(DiagnosticStatus {

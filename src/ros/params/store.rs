@@ -75,18 +75,18 @@ mod tests {
 
     use super::*;
 
-    fn parameter(name: &str, value: Value) -> Parameter {
-        Parameter { name: name.into(), value: to_ros(&value) }
+    fn parameter(name: &str, value: &Value) -> Parameter {
+        Parameter { name: name.into(), value: to_ros(value) }
     }
 
     #[test]
     fn a_change_is_taken_whole_and_counted() {
         let store = ParameterStore::new(Config::default());
         store
-            .set(&[parameter("depth.min", json!(100.0)), parameter("depth.max", json!(200.0))])
+            .set(&[parameter("depth.min", &json!(100.0)), parameter("depth.max", &json!(200.0))])
             .unwrap();
         assert_eq!((store.generation(), store.config().depth.max), (1, 200.0));
-        store.set(&[parameter("depth.max", json!(200.0))]).unwrap();
+        store.set(&[parameter("depth.max", &json!(200.0))]).unwrap();
         assert_eq!(store.generation(), 1);
     }
 
@@ -101,8 +101,9 @@ mod tests {
             ("depth.min", json!(1000.0), "depth.max"),
             ("lazy", Value::Null, "deleted"),
         ] {
-            let text =
-                store.set(&[parameter("stereo.p1", json!(1)), parameter(name, value)]).unwrap_err();
+            let text = store
+                .set(&[parameter("stereo.p1", &json!(1)), parameter(name, &value)])
+                .unwrap_err();
             assert!(text.contains(reason), "{text}");
         }
         assert_eq!((store.generation(), &*store.config()), (0, &Config::default()));
