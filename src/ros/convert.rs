@@ -5,7 +5,7 @@
 //! | `Image` | [`Picture`] | [`picture`], [`picture_into`] |
 //! | `CompressedImage` | [`Picture`] | [`compressed_picture`], [`compressed_picture_into`] |
 //! | one [`Picture`] of both views | two | [`split_side_by_side`], [`split_side_by_side_into`] |
-//! | `Image`, `CompressedImage`, `DisparityImage` of truth | `Image<f32>`, `Image<u16>` | [`floats`], [`labels`], [`compressed_u16`], [`disparities`] |
+//! | `Image`, `CompressedImage` of numbers | `Image<f32>`, `Image<u16>` | [`floats`], [`labels`], [`compressed_u16`] |
 //! | two `CameraInfo` | [`StereoRig`] | [`rig`] |
 //! | [`Camera`] | `CameraInfo` | [`camera_info`] |
 //! | [`Perception`] | messages | [`region_array`], [`disparity_image`], [`depth_image`], … |
@@ -28,8 +28,8 @@ use thiserror::Error;
 pub use calibration::{camera, camera_info, rig};
 pub use compressed::{compressed_picture, compressed_picture_into, compressed_u16};
 pub use dense::{
-    confidence_image, depth_camera_info, depth_image, disparities, disparity_image, float_image,
-    floats, label_image, labels, picture_image, rgb_image, saliency_image,
+    confidence_image, depth_camera_info, depth_image, disparity_image, float_image, floats,
+    label_image, labels, picture_image, rgb_image, saliency_image,
 };
 pub use encoding::ENCODINGS;
 pub use fit::{REGIONS_LIMIT, Reduction, fit_regions};

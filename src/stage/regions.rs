@@ -3,6 +3,7 @@
 pub mod components;
 pub mod contour;
 pub mod measure;
+pub mod simplify;
 pub mod union_find;
 pub mod upright;
 

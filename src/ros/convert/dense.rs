@@ -158,20 +158,6 @@ pub fn labels(message: &sensor_msgs::Image) -> Result<Image<u16>, ConvertError> 
     unpacked(message, &["mono16", "16UC1"], from)
 }
 
-/// The disparity in pixels; NaN where the message marks it invalid.
-///
-/// # Errors
-/// When the image in it is not `32FC1`, or size, step and payload do not fit.
-pub fn disparities(message: &DisparityImage) -> Result<Image<f32>, ConvertError> {
-    let mut image = floats(&message.image)?;
-    for d in image.pixels_mut() {
-        if *d < message.min_disparity {
-            *d = f32::NAN;
-        }
-    }
-    Ok(image)
-}
-
 fn unpacked<const N: usize, T: Copy + Default>(
     message: &sensor_msgs::Image,
     encodings: &[&str],
@@ -259,14 +245,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn disparities_come_back_with_nan_for_invalid() {
-        let p = perception();
-        let back = disparities(&disparity_image(&p)).unwrap();
-        assert_eq!(back.get(1, 0), 12.25);
-        assert_eq!(back.pixels().iter().filter(|d| d.is_nan()).count(), 5);
     }
 
     #[test]
