@@ -9,6 +9,7 @@ pub mod boundary;
 mod cells;
 pub mod color;
 pub mod depth;
+pub mod flow;
 pub mod frequency_tuned;
 pub mod integral;
 pub mod intensity;
@@ -33,6 +34,7 @@ use crate::stage::coarse::{CELL, CoarseDisparity};
 use crate::stage::ground::Ground;
 use crate::stamp::Stamp;
 
+use flow::Flow;
 use frequency_tuned::FrequencyTuned;
 use paper::Paper;
 use scene::SceneSaliency;
@@ -131,6 +133,7 @@ pub struct Saliency {
     mode: Mode,
     smoothing: f32,
     cells: View,
+    flow: Flow,
 }
 
 impl Saliency {
@@ -151,6 +154,7 @@ impl Saliency {
             mode,
             smoothing: config.saliency.temporal_smoothing as f32,
             cells: View::default(),
+            flow: Flow::new(level),
         }
     }
 
@@ -189,8 +193,6 @@ impl Saliency {
             rig: scene.rig,
             previous: before,
         };
-        // The flow that carries the previous map to this frame, for the modes that know one.
-        let flow: Option<&Image<[f32; 2]>> = None;
         match &mut self.mode {
             Mode::Scene(mode) => mode.run(&scene, attention),
             Mode::Paper(paper) => paper.run(&scene, attention),
@@ -198,37 +200,24 @@ impl Saliency {
             Mode::SpectralResidual(residual) => residual.run(&scene, attention),
             Mode::FullFrame => {}
         }
-        if let Some(before) = before {
-            smooth(attention, &before.attention, flow, self.smoothing);
+        if let Some(before) = before.filter(|_| self.smoothing > 0.0) {
+            self.flow.run(&before.gray, &self.cells.gray);
+            smooth(attention, &before.attention, &self.flow, self.smoothing);
         }
         previous.set(scene.stamp, &self.cells.gray, attention);
         upsample(attention, self.size, saliency);
     }
 }
 
-/// (1 - a) of this frame's map and a of the one before. With `flow` the latter is
-/// read where each cell was in the previous frame: `flow` points there, in cells.
-fn smooth(
-    attention: &mut Image<f32>,
-    before: &Image<f32>,
-    flow: Option<&Image<[f32; 2]>>,
-    share: f32,
-) {
-    if share <= 0.0 {
-        return;
-    }
-    let Some(flow) = flow.filter(|flow| flow.size() == attention.size()) else {
-        for (now, before) in attention.pixels_mut().iter_mut().zip(before.pixels()) {
-            *now += share * (before - *now);
-        }
-        return;
-    };
+/// (1 - a) of this frame's map and a of the one before, the latter read where
+/// each cell was then. What was not seen before has no past: there `a` fades
+/// with the flow's trust, so that a new thing is attended to at once.
+fn smooth(attention: &mut Image<f32>, before: &Image<f32>, flow: &Flow, share: f32) {
     for y in 0..attention.height() {
-        let flow = flow.row(y);
+        let (dx, dy, trust) = (flow.dx.row(y), flow.dy.row(y), flow.trust.row(y));
         for (x, now) in attention.row_mut(y).iter_mut().enumerate() {
-            let [dx, dy] = flow[x];
-            let before = sample(before, x as f32 + dx, y as f32 + dy);
-            *now += share * (before - *now);
+            let before = sample(before, x as f32 + dx[x], y as f32 + dy[x]);
+            *now += share * trust[x] * (before - *now);
         }
     }
 }

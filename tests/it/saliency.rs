@@ -11,6 +11,7 @@ use salient_stereo::stage::preprocess::gradient::gradient;
 use salient_stereo::stage::preprocess::luma::luma;
 use salient_stereo::stage::saliency::color::{Color, Lab};
 use salient_stereo::stage::saliency::depth::Depth;
+use salient_stereo::stage::saliency::flow::Flow;
 use salient_stereo::stage::saliency::integral::{Integral, MAX_RADIUS, MAX_VALUE};
 use salient_stereo::stage::saliency::intensity::Intensity;
 use salient_stereo::stage::saliency::motion::Motion;
@@ -424,12 +425,69 @@ fn the_fourier_transform_equals_its_sum() {
     assert!(spectrum.im.iter().flatten().all(|im| im.abs() < 1e-5));
 }
 
+/// Smooth random texture, moved by whole pixels.
+fn texture(size: Size, dx: f64, dy: f64) -> Image<u8> {
+    let lattice = plain::real(&Noise(20).gray(Size::new(90, 70)));
+    Image::from_fn(size, |x, y| {
+        let (u, v) = ((x as f64 - dx) / 7.0 + 5.0, (y as f64 - dy) / 7.0 + 5.0);
+        plain::bilinear(&lattice, u, v) as u8
+    })
+}
+
 #[test]
-fn smoothing_blends_with_the_frame_before_and_a_reset_forgets_it() {
-    let size = Size::new(131, 45);
+fn flow_points_to_where_things_were() {
+    let size = Size::new(200, 140);
+    for (dx, dy) in [(0, 0), (3, -2), (-7, 4), (12, 5)] {
+        let mut flow = Flow::new(simd::detect());
+        flow.run(&texture(size, 0.0, 0.0), &texture(size, f64::from(dx), f64::from(dy)));
+        // Away from the edge: the coarsest blocks are 32 pixels wide, and what
+        // came into view was not seen before.
+        for y in 50..90 {
+            for x in 60..140 {
+                let found = (flow.dx.get(x, y), flow.dy.get(x, y));
+                assert_eq!(found, (-dx as f32, -dy as f32), "({x}, {y})");
+                assert!(flow.trust.get(x, y) > 0.9, "({x}, {y})");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_was_not_seen_before_is_not_trusted() {
+    let size = Size::new(120, 72);
+    let before = texture(size, 0.0, 0.0);
+    let inside = |x: usize, y: usize| (40..72).contains(&x) && (24..48).contains(&y);
+    let now = Image::from_fn(size, |x, y| {
+        if inside(x, y) { (x / 3 + y / 2) as u8 % 2 * 250 } else { before.get(x, y) }
+    });
+    let mut flow = Flow::new(simd::detect());
+    flow.run(&before, &now);
+    assert!(flow.trust.get(56, 36) < 0.1, "{}", flow.trust.get(56, 36));
+    assert_eq!((flow.dx.get(12, 60), flow.trust.get(12, 60)), (0.0, 1.0));
+}
+
+#[test]
+fn flow_of_a_few_pixels_is_none() {
+    for size in ODD_SIZES {
+        let gray = Noise(19).gray(size);
+        let mut flow = Flow::new(simd::detect());
+        flow.run(&gray, &gray);
+        let still = |map: &Image<f32>| map.pixels().iter().all(|&v| v == 0.0);
+        assert!(still(&flow.dx) && still(&flow.dy), "{size}");
+        assert_eq!(flow.trust, Image::filled(size, 1.0), "{size}");
+    }
+}
+
+#[test]
+fn smoothing_blends_with_the_past_along_the_flow_and_a_reset_forgets_it() {
+    let size = Size::new(331, 245);
     let mut config = config(SaliencyMode::FrequencyTuned);
     config.saliency.temporal_smoothing = 0.25;
-    let (one, two) = (World::noise(size, 15), World::noise(size, 16));
+    let world = |at: usize| {
+        let gray = texture(size, at as f64, 0.0);
+        World::new(Image::from_fn(size, |x, y| [gray.get(x, y), 90, gray.get(x, y) / 2]))
+    };
+    let (one, two) = (world(0), world(12));
     let (alone, _) = first(&config, &one.left, &one.coarse);
     let (other, _) = first(&config, &two.left, &two.coarse);
     let mut stage = Saliency::new(&config, size, simd::detect());
@@ -437,11 +495,18 @@ fn smoothing_blends_with_the_frame_before_and_a_reset_forgets_it() {
     let (start, _) = run(&mut stage, &mut previous, &one.left, &one.coarse);
     assert_eq!(start, alone);
     let (blend, pixels) = run(&mut stage, &mut previous, &two.left, &two.coarse);
+    let mut flow = Flow::new(simd::detect());
+    flow.run(&one.cells.gray, &two.cells.gray);
+    let before = plain::real(&alone);
     let expected = Image::from_fn(blend.size(), |x, y| {
-        0.75 * f64::from(other.get(x, y)) + 0.25 * f64::from(alone.get(x, y))
+        let (u, v) = (x as f32 + flow.dx.get(x, y), y as f32 + flow.dy.get(x, y));
+        let now = f64::from(other.get(x, y));
+        let share = 0.25 * f64::from(flow.trust.get(x, y));
+        now + share * (plain::bilinear(&before, u.into(), v.into()) - now)
     });
-    assert_near(&blend, &expected, 1e-6, "blend");
+    assert_near(&blend, &expected, 1e-5, "blend");
     assert_near(&pixels, &plain::upsample(&blend, size), 1e-6, "full-size blend");
+    assert!(blend != other, "the past must count");
     previous.clear();
     let (again, _) = run(&mut stage, &mut previous, &two.left, &two.coarse);
     assert_eq!(again, other, "a reset must forget the frame before");

@@ -111,6 +111,19 @@ pub fn normalize(map: &Image<f64>, least: f64) -> Image<f64> {
     Image::from_fn(map.size(), |x, y| (map.get(x, y) - low) / (high - low).max(least))
 }
 
+/// Bilinear value at `(x, y)`, coordinates limited to the image.
+pub fn bilinear(image: &Image<f64>, x: f64, y: f64) -> f64 {
+    let (x, y) =
+        (x.clamp(0.0, (image.width() - 1) as f64), y.clamp(0.0, (image.height() - 1) as f64));
+    let value = |dx: usize, dy: usize| {
+        image.get_clamped(x as isize + dx as isize, y as isize + dy as isize)
+    };
+    let (fx, fy) = (x.fract(), y.fract());
+    let upper = value(0, 0) * (1.0 - fx) + value(1, 0) * fx;
+    let lower = value(0, 1) * (1.0 - fx) + value(1, 1) * fx;
+    upper * (1.0 - fy) + lower * fy
+}
+
 /// The value at each pixel between the centres of 4x4-pixel cells.
 pub fn upsample(cells: &Image<f32>, size: Size) -> Image<f64> {
     let place = |at: usize, cells: usize| {

@@ -1,0 +1,226 @@
+//! Where the cells of this frame were in the previous one.
+
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
+use crate::image::{Image, Size};
+use crate::simd::{Level, dispatch};
+use crate::stage::preprocess::resize::box_mean;
+use crate::stage::saliency::upsample::upsample;
+
+/// Halvings of the quarter-size view.
+const LEVELS: usize = 3;
+/// Pixels between blocks along each axis.
+const STEP: usize = 4;
+/// Side of a block in pixels: blocks overlap by half.
+const BLOCK: usize = 8;
+/// Search at the coarsest level in its pixels, to each side: with one more
+/// pixel at each finer level, 15 cells or 60 full-size pixels in all.
+const REACH: i32 = 3;
+/// What a pixel of distance from the prediction costs, in gray levels summed
+/// over a block: without texture the prediction stands.
+const STIFFNESS: u32 = 12;
+/// Mean difference in gray levels up to which a match is trusted fully, and
+/// over which trust fades to none.
+const SURE: f32 = 16.0;
+const FADE: f32 = 16.0;
+
+/// Block matching from coarse to fine on the quarter-size gray view.
+pub struct Flow {
+    level: Level,
+    now: [Image<u8>; LEVELS],
+    before: [Image<u8>; LEVELS],
+    grid: Image<[i32; 2]>,
+    next: Image<[i32; 2]>,
+    block: Image<f32>,
+    /// Columns from each cell to its place in the previous frame.
+    pub dx: Image<f32>,
+    /// Rows from each cell to its place in the previous frame.
+    pub dy: Image<f32>,
+    /// 1 where the two places look alike, 0 where what is here now was not
+    /// seen before.
+    pub trust: Image<f32>,
+}
+
+impl Flow {
+    /// The stage at this SIMD level.
+    pub fn new(level: Level) -> Self {
+        Self {
+            level,
+            now: Default::default(),
+            before: Default::default(),
+            grid: Image::default(),
+            next: Image::default(),
+            block: Image::default(),
+            dx: Image::default(),
+            dy: Image::default(),
+            trust: Image::default(),
+        }
+    }
+
+    /// Matches two views of one size.
+    pub fn run(&mut self, before: &Image<u8>, now: &Image<u8>) {
+        pyramid(self.level, before, &mut self.before);
+        pyramid(self.level, now, &mut self.now);
+        self.grid.resize(Size::default());
+        for level in (0..LEVELS).rev() {
+            let (now, before) = (&self.now[level], &self.before[level]);
+            self.next.resize(now.size().divided_by(STEP));
+            dispatch!(self.level, _simd => refine(now, before, &self.grid, &mut self.next));
+            median(&self.next, &mut self.grid);
+        }
+        let (size, grid) = (now.size(), &self.grid);
+        self.block.resize(grid.size());
+        for (axis, out) in [&mut self.dx, &mut self.dy].into_iter().enumerate() {
+            for (value, shift) in self.block.pixels_mut().iter_mut().zip(grid.pixels()) {
+                *value = shift[axis] as f32;
+            }
+            upsample(&self.block, size, out);
+        }
+        for y in 0..grid.height() {
+            for (x, value) in self.block.row_mut(y).iter_mut().enumerate() {
+                let cost = cost(&self.now[0], &self.before[0], (x, y), grid.get(x, y));
+                let mean = cost.unwrap_or(0) as f32 / (BLOCK * BLOCK) as f32;
+                *value = (1.0 - (mean - SURE) / FADE).clamp(0.0, 1.0);
+            }
+        }
+        upsample(&self.block, size, &mut self.trust);
+    }
+}
+
+/// Shifts of the blocks of one level from those of the coarser one, of which
+/// the coarsest level has none.
+#[inline(always)]
+fn refine(
+    now: &Image<u8>,
+    before: &Image<u8>,
+    coarser: &Image<[i32; 2]>,
+    shifts: &mut Image<[i32; 2]>,
+) {
+    let coarsest = coarser.size().is_empty();
+    let reach = if coarsest { REACH } else { 1 };
+    for y in 0..shifts.height() {
+        for x in 0..shifts.width() {
+            let guess = if coarsest {
+                [0, 0]
+            } else {
+                let u = (x / 2).min(coarser.width() - 1);
+                let v = (y / 2).min(coarser.height() - 1);
+                coarser.get(u, v).map(|shift| 2 * shift)
+            };
+            let mut best = Best { shift: guess, cost: u32::MAX };
+            let mut consider = |shift: [i32; 2]| {
+                if let Some(cost) = cost(now, before, (x, y), shift) {
+                    let off = shift[0].abs_diff(guess[0]) + shift[1].abs_diff(guess[1]);
+                    best.improve(shift, cost + STIFFNESS * off);
+                }
+            };
+            consider(guess);
+            consider([0, 0]);
+            if x > 0 {
+                consider(shifts.get(x - 1, y));
+            }
+            if y > 0 {
+                consider(shifts.get(x, y - 1));
+            }
+            for dy in -reach..=reach {
+                for dx in -reach..=reach {
+                    // At the finer levels a step along one axis at a time.
+                    if coarsest || dx * dy == 0 {
+                        consider([guess[0] + dx, guess[1] + dy]);
+                    }
+                }
+            }
+            shifts.set(x, y, best.shift);
+        }
+    }
+}
+
+struct Best {
+    shift: [i32; 2],
+    cost: u32,
+}
+
+impl Best {
+    fn improve(&mut self, shift: [i32; 2], cost: u32) {
+        if cost < self.cost {
+            *self = Self { shift, cost };
+        }
+    }
+}
+
+fn pyramid(level: Level, view: &Image<u8>, out: &mut [Image<u8>; LEVELS]) {
+    out[0].copy_from(view);
+    for i in 1..LEVELS {
+        let (finer, coarser) = out.split_at_mut(i);
+        let (fine, coarse) = (&finer[i - 1], &mut coarser[0]);
+        let size = fine.size().divided_by(2);
+        coarse.resize(size);
+        box_mean::<1, 2>(level, fine.pixels(), fine.width(), coarse.pixels_mut(), size.width);
+    }
+}
+
+/// Sum of absolute differences between a block and its shifted place; `None`
+/// where one of them is not inside the image.
+#[inline(always)]
+fn cost(
+    now: &Image<u8>,
+    before: &Image<u8>,
+    block: (usize, usize),
+    shift: [i32; 2],
+) -> Option<u32> {
+    let place = |block: usize, length: usize, shift: i32| {
+        let last = length.checked_sub(BLOCK)?;
+        // Blocks at the edge move inside.
+        let start = (block * STEP).saturating_sub((BLOCK - STEP) / 2).min(last);
+        let shifted = usize::try_from(start as i32 + shift).ok()?;
+        (shifted <= last).then_some((start, shifted))
+    };
+    let width = now.width();
+    let (x, u) = place(block.0, now.width(), shift[0])?;
+    let (y, v) = place(block.1, now.height(), shift[1])?;
+    let (now, before) = (&now.pixels()[y * width + x..], &before.pixels()[v * width + u..]);
+    // One sum per column of the block: the columns are added side by side.
+    let mut sums = [0_u16; BLOCK];
+    for row in 0..BLOCK {
+        let a = now[row * width..].first_chunk::<BLOCK>()?;
+        let b = before[row * width..].first_chunk::<BLOCK>()?;
+        for i in 0..BLOCK {
+            sums[i] += u16::from(a[i].abs_diff(b[i]));
+        }
+    }
+    Some(sums.iter().map(|&sum| u32::from(sum)).sum())
+}
+
+/// Median over 3x3 blocks, each axis by itself; beyond the edge the outermost
+/// blocks continue.
+fn median(shifts: &Image<[i32; 2]>, out: &mut Image<[i32; 2]>) {
+    let Size { width, height } = shifts.size();
+    out.resize(shifts.size());
+    for y in 0..height {
+        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| shifts.row(y));
+        for (x, out) in out.row_mut(y).iter_mut().enumerate() {
+            let columns = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
+            for (axis, out) in out.iter_mut().enumerate() {
+                // As in the median of an image: see `preprocess::denoise`.
+                let [[l0, m0, h0], [l1, m1, h1], [l2, m2, h2]] =
+                    columns.map(|x| sorted(rows.map(|row| row[x][axis])));
+                let low = l0.max(l1).max(l2);
+                let high = h0.min(h1).min(h2);
+                *out = sorted([low, sorted([m0, m1, m2])[1], high])[1];
+            }
+        }
+    }
+}
+
+/// Three values in ascending order.
+fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
+    let (low, high) = (a.min(b), a.max(b));
+    let (middle, high) = (high.min(c), high.max(c));
+    [low.min(middle), low.max(middle), high]
+}
+
+// Blocks are spread over cells by the same interpolation as cells over pixels.
+const _: () = assert!(STEP == crate::stage::coarse::CELL);
