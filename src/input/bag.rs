@@ -204,12 +204,11 @@ impl BagSource {
             if self.ended {
                 return Ok(None);
             }
-            match self.reader.next_message()? {
-                Some(message) => self.take(message),
-                None => {
-                    self.ended = true;
-                    self.sync.finish();
-                }
+            if let Some(message) = self.reader.next_message()? {
+                self.take(message);
+            } else {
+                self.ended = true;
+                self.sync.finish();
             }
             while let Some(pair) = self.sync.pop() {
                 self.ready.push_back(pair);
@@ -246,15 +245,18 @@ impl BagSource {
     /// The frame of a pair; its reason when it cannot be used.
     fn observe(&mut self, pair: &RawPair) -> Result<Observation, String> {
         let left_topic = &self.selection.left;
-        let (left, frame_id) =
-            decode(&pair.left, left_topic.compressed).map_err(|e| format!("left image: {e}"))?;
         let (left, right) = match (&pair.right, &self.selection.right) {
-            (Some(right), Some(topic)) => {
-                let (right, _) =
-                    decode(right, topic.compressed).map_err(|e| format!("right image: {e}"))?;
-                (left, right)
-            }
-            _ => convert::split_side_by_side(&left).map_err(|e| e.to_string())?,
+            // Decoding JPEG or PNG takes as long as a stage: both at once.
+            (Some(right), Some(topic)) => rayon::join(
+                || decode(&pair.left, left_topic.compressed),
+                || decode(right, topic.compressed).map(Some),
+            ),
+            _ => (decode(&pair.left, left_topic.compressed), Ok(None)),
+        };
+        let (left, frame_id) = left.map_err(|e| format!("left image: {e}"))?;
+        let (left, right) = match right.map_err(|e| format!("right image: {e}"))? {
+            Some((right, _)) => (left, right),
+            None => convert::split_side_by_side(&left).map_err(|e| e.to_string())?,
         };
         let size = convert::common_size(&left, &right).map_err(|e| e.to_string())?;
         let rig = self.rig(pair, size).map_err(|e| e.to_string())?;

@@ -17,8 +17,11 @@ const TAIL_LEN: u64 = FOOTER_LEN + 8;
 /// Records outside chunks are read in runs of about this many bytes.
 const RUN_BYTES: u64 = 4 << 20;
 
-/// Most runs and chunks of one file: at 1 KiB each, a terabyte.
-const MAX_UNITS: usize = 1 << 30;
+/// Most runs and chunks of one file: at 1 MiB each, 4 TiB.
+const MAX_UNITS: usize = 1 << 22;
+
+/// Largest summary that is read; a larger one is treated as none.
+const MAX_SUMMARY_BYTES: u64 = 256 << 20;
 
 /// What one file holds.
 #[derive(Clone, Debug, Default)]
@@ -67,7 +70,7 @@ fn from_summary(file: &mut BufReader<File>, number: usize, len: u64) -> io::Resu
     file.seek(SeekFrom::Start(footer_at))?;
     file.read_exact(&mut tail)?;
     let Some((start, crc)) = footer(&tail) else { return Ok(None) };
-    if start < MAGIC.len() as u64 || start >= footer_at {
+    if start < MAGIC.len() as u64 || start >= footer_at || footer_at - start > MAX_SUMMARY_BYTES {
         return Ok(None);
     }
     let mut summary = Vec::new();

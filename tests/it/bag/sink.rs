@@ -76,3 +76,31 @@ fn a_replay_gives_the_same_bytes_for_any_number_of_threads() {
     let expected: BTreeMap<_, _> = topics.map(|topic| (topic.to_owned(), recipe.frames)).into();
     assert_eq!(counts, expected);
 }
+
+/// Opt-in, as it needs Python with `rosbags`, `mcap-ros2-support` and `numpy`:
+/// `SALIENT_STEREO_INTEROP=1`, and `SALIENT_STEREO_PYTHON` for another interpreter
+/// than `python3`.
+#[test]
+fn other_readers_agree() {
+    if std::env::var_os("SALIENT_STEREO_INTEROP").is_none() {
+        println!("SALIENT_STEREO_INTEROP is not set: other readers are not asked");
+        return;
+    }
+    let python = std::env::var_os("SALIENT_STEREO_PYTHON").unwrap_or_else(|| "python3".into());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interop/read_bag.py");
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("in.mcap");
+    Recipe { size: Size::new(200, 64), ..Recipe::default() }.write(&input);
+    for name in ["out.mcap", "folder"] {
+        let output = folder.path().join(name);
+        replay(&input, &output, 2);
+        let run = std::process::Command::new(&python)
+            .arg(&script)
+            .args([&output, &input])
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&run.stdout);
+        assert!(run.status.success(), "{text}{}", String::from_utf8_lossy(&run.stderr));
+        assert!(text.contains("6 region arrays"), "{text}");
+    }
+}
