@@ -28,6 +28,8 @@ mod it {
     mod saliency;
     mod stereo;
     mod sync;
+    #[cfg(feature = "tool")]
+    mod synthetic;
     mod track;
     #[cfg(feature = "tool")]
     mod vectors;

@@ -279,7 +279,7 @@ impl SyntheticScene {
         let renderer = Renderer::new(&world);
         let left = self.viewpoint(&world, Side::Left);
         let right = self.viewpoint(&world, Side::Right);
-        let noise = if self.options.noise { 1.4 } else { 0.0 };
+        let noise = if self.options.noise { 1.2 } else { 0.0 };
         let sensor = Sensor::new(1.0, noise);
         let seed = 2 * index as u32;
         let samples = self.options.samples;

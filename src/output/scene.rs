@@ -59,7 +59,7 @@ pub struct SceneMessages {
 /// JPEG quality that keeps a shipped bag below 8 MiB.
 const fn quality(kind: SceneKind) -> u8 {
     match kind {
-        SceneKind::Street => 88,
+        SceneKind::Street => 80,
         SceneKind::Tabletop => 93,
     }
 }

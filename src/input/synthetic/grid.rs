@@ -64,6 +64,20 @@ pub struct Stage {
     pub cell: f64,
 }
 
+/// What one part covers across the light, and how far towards it it reaches.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shade {
+    x: (f64, f64),
+    y: (f64, f64),
+    top: f64,
+}
+
+impl Shade {
+    fn covers(&self, x: f64, y: f64, height: f64) -> bool {
+        x >= self.x.0 && x <= self.x.1 && y >= self.y.0 && y <= self.y.1 && height <= self.top
+    }
+}
+
 /// What can stand in the way of light from one direction: the parts sorted
 /// into cells of a plane across that direction.
 #[derive(Clone, Debug)]
@@ -74,6 +88,8 @@ pub struct ShadowGrid {
     cell: f64,
     size: [usize; 2],
     raster: Raster,
+    /// By part number.
+    shades: Vec<Shade>,
 }
 
 impl ShadowGrid {
@@ -96,38 +112,45 @@ impl ShadowGrid {
         let ranges = across.map(|axis| extent(&axis, &corners));
         let size = ranges.map(|(low, high)| ((high - low) / stage.cell).ceil() as usize + 1);
         let origin = ranges.map(|(low, _)| low);
-        let cells: Vec<(u16, Cells)> = parts
-            .iter()
-            .enumerate()
-            .filter_map(|(index, part)| {
-                let corners = part.corners();
-                let range = |k: usize| {
-                    let (low, high) = extent(&across[k], &corners);
-                    let low = ((low - origin[k]) / stage.cell).floor();
-                    let high = ((high - origin[k]) / stage.cell).floor();
-                    let last = size[k] as f64 - 1.0;
-                    (high >= 0.0 && low <= last)
-                        .then(|| (low.max(0.0) as usize, high.min(last) as usize))
-                };
-                Some((u16::try_from(index).ok()?, Cells { x: range(0)?, y: range(1)? }))
-            })
-            .collect();
+        let mut shades = vec![Shade::default(); parts.len()];
+        let mut cells = Vec::new();
+        for (index, part) in parts.iter().enumerate().filter(|(_, part)| part.casts) {
+            let corners = part.corners();
+            let [x, y] = across.map(|axis| extent(&axis, &corners));
+            shades[index] = Shade { x, y, top: extent(&towards, &corners).1 };
+            let range = |k: usize, (low, high): (f64, f64)| {
+                let low = ((low - origin[k]) / stage.cell).floor();
+                let high = ((high - origin[k]) / stage.cell).floor();
+                let last = size[k] as f64 - 1.0;
+                (high >= 0.0 && low <= last)
+                    .then(|| (low.max(0.0) as usize, high.min(last) as usize))
+            };
+            if let (Ok(index), Some(x), Some(y)) = (u16::try_from(index), range(0, x), range(1, y))
+            {
+                cells.push((index, Cells { x, y }));
+            }
+        }
         let raster = Raster::new(size[0], size[1], &cells);
-        Self { towards, across, origin, cell: stage.cell, size, raster }
+        Self { towards, across, origin, cell: stage.cell, size, raster, shades }
     }
 
     /// True when nothing stands between `point` and the light.
     pub fn is_lit(&self, parts: &[Part], point: Vec3) -> bool {
-        let place = |k: usize| {
-            let value = (self.across[k].dot(&point) - self.origin[k]) / self.cell;
+        let [u, v] = self.across.map(|axis| axis.dot(&point));
+        let place = |k: usize, value: f64| {
+            let value = (value - self.origin[k]) / self.cell;
             (value >= 0.0 && value < self.size[k] as f64).then_some(value as usize)
         };
-        let (Some(x), Some(y)) = (place(0), place(1)) else { return true };
+        let (Some(x), Some(y)) = (place(0, u), place(1, v)) else { return true };
+        let height = self.towards.dot(&point);
         let ray = Ray { origin: point, direction: self.towards };
         let span = Span { near: 1e-4, far: 1e4 };
-        self.raster
-            .list(x, y)
-            .iter()
-            .all(|index| parts[usize::from(*index)].meet(&ray, span).is_none())
+        self.raster.list(x, y).iter().all(|index| {
+            let index = usize::from(*index);
+            let shade = &self.shades[index];
+            let part = &parts[index];
+            !shade.covers(u, v, height)
+                || part.shape.meet(&part.pose.local_ray(&ray), span).is_none()
+        })
     }
 }

@@ -66,8 +66,10 @@ pub struct Part {
     pub material: Material,
     /// Id of the salient object it belongs to, 0 for background.
     pub object: u16,
+    /// False for ground, which has nothing below it to shade.
+    pub casts: bool,
     centre: Vec3,
-    radius2: f64,
+    radius: f64,
 }
 
 impl Part {
@@ -75,8 +77,19 @@ impl Part {
     pub fn new(shape: Shape, pose: Pose, material: Material, object: u16) -> Self {
         let (low, high) = shape.bounds();
         let centre = pose.point((low + high) / 2.0);
-        let radius2 = ((high - low) / 2.0).norm_squared() * 1.0001;
-        Self { shape, pose, material, object, centre, radius2 }
+        let radius = ((high - low) / 2.0).norm() * 1.0001;
+        Self { shape, pose, material, object, casts: true, centre, radius }
+    }
+
+    /// The same as ground: it casts no shadow.
+    #[must_use]
+    pub fn as_ground(self) -> Self {
+        Self { casts: false, ..self }
+    }
+
+    /// Distance of its nearest point from `eye`, or less.
+    pub fn distance(&self, eye: Vec3) -> f64 {
+        (self.centre - eye).norm() - self.radius
     }
 
     /// First contact of a world ray inside `span`.
@@ -84,8 +97,12 @@ impl Part {
         let to = self.centre - ray.origin;
         let along = to.dot(&ray.direction);
         let length2 = ray.direction.norm_squared();
-        // Distance of the bounding sphere's centre from the ray's line.
-        if to.norm_squared() * length2 - along * along > self.radius2 * length2 {
+        // The bounding sphere is beside the ray's line, or behind the end of the span.
+        let reach2 = self.radius * self.radius;
+        let beyond = along - span.far * length2;
+        if to.norm_squared() * length2 - along * along > reach2 * length2
+            || (beyond > 0.0 && beyond * beyond > reach2 * length2)
+        {
             return None;
         }
         self.shape.meet(&self.pose.local_ray(ray), span)

@@ -100,13 +100,12 @@ fn ground() -> Vec<Part> {
             material,
             0,
         )
+        .as_ground()
     };
-    let mut parts = vec![Part::new(
-        Shape::Ground { reach: 400.0 },
-        Pose::at(0.0, 0.0, 0.0),
-        Material::Asphalt,
-        0,
-    )];
+    let mut parts = vec![
+        Part::new(Shape::Ground { reach: 400.0 }, Pose::at(0.0, 0.0, 0.0), Material::Asphalt, 0)
+            .as_ground(),
+    ];
     for side in [-1.0, 1.0] {
         parts.push(slab((side * KERB, side * (KERB + 0.18)), Material::Kerb));
         parts.push(slab((side * (KERB + 0.18), side * 14.0), Material::Slabs));

@@ -36,9 +36,14 @@ impl Viewpoint {
     pub fn tiles(&self, parts: &[Part]) -> Raster {
         let columns = self.size.width.div_ceil(TILE);
         let rows = self.size.height.div_ceil(TILE);
-        let cells: Vec<(u16, Cells)> = parts
+        // Near parts first: they rule out what is behind them.
+        let eye = self.pose.position;
+        let mut order: Vec<(f64, usize)> =
+            parts.iter().enumerate().map(|(index, part)| (part.distance(eye), index)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let cells: Vec<(u16, Cells)> = order
             .iter()
-            .enumerate()
+            .map(|(_, index)| (*index, &parts[*index]))
             .filter_map(|(index, part)| {
                 let (low, high) = self.extent(part)?;
                 let range = |low: f64, high: f64, count: usize| {

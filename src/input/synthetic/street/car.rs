@@ -102,12 +102,10 @@ pub fn car(parts: &mut Vec<Part>, object: u16, place: &CarPlace) {
     let pose = Pose::at(place.x, place.y, 0.0).turned(2, place.heading);
     let look = CarLook {
         paint: place.paint,
-        half_length: o.half_length,
         half_width: o.half_width,
         axles: o.axles,
         wheel: o.wheel,
         belt: o.belt,
-        roof: o.roof,
         seed: place.seed,
         braking: place.braking,
     };

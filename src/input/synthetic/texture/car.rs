@@ -11,8 +11,6 @@ use super::print::plate;
 pub struct CarLook {
     /// Colour of the paint.
     pub paint: Vec3,
-    /// Half of its length in metres.
-    pub half_length: f64,
     /// Half of its width in metres.
     pub half_width: f64,
     /// x of the front and rear axle.
@@ -21,8 +19,6 @@ pub struct CarLook {
     pub wheel: f64,
     /// Height of the belt line, where the windows begin.
     pub belt: f64,
-    /// Height of the roof.
-    pub roof: f64,
     /// Number plate and dirt.
     pub seed: u32,
     /// Brake lights on.
