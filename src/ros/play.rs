@@ -16,6 +16,10 @@ use crate::ros::node::{Graph, NodeError, RosNode};
 use crate::ros::qos;
 use crate::stamp::Stamp;
 
+/// From knowing a subscriber to being matched with it, on both sides: discovery
+/// tells of the first, nothing of the second.
+const SETTLING: Duration = Duration::from_millis(500);
+
 /// What keeps a player from playing.
 #[derive(Debug, Error)]
 pub enum PlayError {
@@ -94,12 +98,14 @@ impl StereoPlayer {
         Ok(Self { graph: node.graph(), images, infos, topics, refused: 0 })
     }
 
-    /// Waits until every topic has a subscriber; false when time runs out.
+    /// Waits until every topic has a subscriber, and a moment longer for the
+    /// others to have found us too; false when time runs out.
     pub fn wait_for_subscribers(&self, patience: Duration, stop: &AtomicBool) -> bool {
         let deadline = Instant::now() + patience;
         while Instant::now() < deadline && !stop.load(Ordering::Relaxed) {
             let subscribed = self.graph.subscribed_topics();
             if self.topics.iter().all(|(name, _)| subscribed.binary_search(name).is_ok()) {
+                thread::sleep(SETTLING);
                 return true;
             }
             thread::sleep(Duration::from_millis(20));

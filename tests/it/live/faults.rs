@@ -2,8 +2,6 @@
 //! goes on.
 
 use std::sync::atomic::AtomicBool;
-use std::thread;
-use std::time::Duration;
 
 use salient_stereo::ros::args::LogArgs;
 use salient_stereo::ros::log;
@@ -31,7 +29,6 @@ fn bad_messages_are_counted_by_reason_and_the_node_goes_on() {
     let rosout = peer.subscribe::<Log>("/rosout", &qos::reliable_input()).unwrap();
     let diagnostics = peer.subscribe::<DiagnosticArray>("/diagnostics", &qos::output()).unwrap();
     assert!(player.wait_for_subscribers(PATIENCE, &AtomicBool::new(false)));
-    thread::sleep(Duration::from_millis(300));
 
     let mut number = 0;
     let mut offer = |player: &mut StereoPlayer, spoil: fn(&mut StereoMessages)| {
