@@ -84,7 +84,8 @@ fn split(folder: &std::path::Path) -> Vec<String> {
 }
 
 fn metadata(files: &[String]) -> String {
-    let files: String = files.iter().map(|file| format!("    - {file}\n")).collect();
+    let files: Vec<_> = files.iter().map(|file| format!("    - {file}\n")).collect();
+    let files = files.concat();
     format!(
         "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n{files}  compression_format: \"\"\n  compression_mode: \"\"\n"
     )

@@ -239,11 +239,8 @@ fn list(folder: &Path) -> Result<BTreeMap<String, Vec<u32>>, DatasetError> {
 fn some_of<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
     const MOST: usize = 20;
     let more = names.len().saturating_sub(MOST);
-    let mut text = names.take(MOST).map(String::as_str).collect::<Vec<_>>().join(", ");
-    if more > 0 {
-        text.push_str(&format!(" and {more} more"));
-    }
-    text
+    let text = names.take(MOST).map(String::as_str).collect::<Vec<_>>().join(", ");
+    if more > 0 { format!("{text} and {more} more") } else { text }
 }
 
 /// Focal length, principal points and baseline from two projection matrices:

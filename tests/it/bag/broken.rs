@@ -10,7 +10,7 @@ use salient_stereo::input::FrameSource;
 use salient_stereo::input::bag::{BagOptions, BagSource, Limits};
 use salient_stereo::output::bag::Packing;
 
-use super::recipe::{Recipe, failure, observe};
+use super::recipe::{Miscalibrate, Recipe, Spoil, failure, observe};
 use super::{PACKINGS, metadata};
 
 fn bytes_of(recipe: &Recipe) -> Vec<u8> {
@@ -258,11 +258,11 @@ fn skipped(recipe: &Recipe) -> (usize, String) {
 
 #[test]
 fn images_that_cannot_be_used_are_skipped_with_their_reason() {
-    let spoilt: [(fn(usize, &mut salient_stereo::ros::message::sensor_msgs::Image), &str); 4] = [
+    let spoilt: [(Spoil, &str); 4] = [
         (
             |i, m| {
                 if i == 2 {
-                    m.data.truncate(12)
+                    m.data.truncate(12);
                 }
             },
             "1x left image: image payload is 12 bytes, 288 expected",
@@ -270,7 +270,7 @@ fn images_that_cannot_be_used_are_skipped_with_their_reason() {
         (
             |i, m| {
                 if i == 2 {
-                    m.encoding = "jpeg2000".into()
+                    m.encoding = "jpeg2000".into();
                 }
             },
             "unknown image encoding 'jpeg2000'",
@@ -278,7 +278,7 @@ fn images_that_cannot_be_used_are_skipped_with_their_reason() {
         (
             |i, m| {
                 if i == 2 {
-                    m.step = 3
+                    m.step = 3;
                 }
             },
             "step is 3 bytes",
@@ -287,7 +287,7 @@ fn images_that_cannot_be_used_are_skipped_with_their_reason() {
             |i, m| {
                 if i == 2 {
                     m.height = 4;
-                    m.data.truncate(4 * 48)
+                    m.data.truncate(4 * 48);
                 }
             },
             "left image is 16x4, right image is 16x6",
@@ -302,8 +302,7 @@ fn images_that_cannot_be_used_are_skipped_with_their_reason() {
 
 #[test]
 fn calibrations_that_cannot_be_used_are_skipped_with_their_reason() {
-    type Infos = salient_stereo::ros::message::sensor_msgs::CameraInfo;
-    let wrong: [(fn(&mut Infos, &mut Infos), &str); 4] = [
+    let wrong: [(Miscalibrate, &str); 4] = [
         (|left, _| left.k = [0.0; 9], "left camera info is uncalibrated"),
         (|_, right| right.p[3] = 200.0, "swapped"),
         (|_, right| right.p[3] = 0.0, "baseline is zero"),

@@ -7,6 +7,7 @@ use mcap::records::MessageHeader;
 use salient_stereo::config::{Config, ImageTransport, Input};
 use salient_stereo::input::FrameSource;
 use salient_stereo::input::bag::{BagOptions, BagSource, BagTopics};
+use salient_stereo::ros::message::std_msgs::Header;
 
 use super::recipe::{Recipe, failure, observe};
 
@@ -158,7 +159,7 @@ fn missing_camera_infos_are_named_and_can_be_given() {
 
     let (_other, with) = written(&Recipe::default());
     let frame = &observe(&with, &Config::default()).0[0].frame;
-    let info = |camera| salient_stereo::ros::convert::camera_info(camera, Default::default());
+    let info = |camera| salient_stereo::ros::convert::camera_info(camera, Header::default());
     let camera_infos = [Some(info(&frame.rig.left)), Some(info(&frame.rig.right))];
     let options = BagOptions { camera_infos, ..BagOptions::default() };
     let mut source = BagSource::open(&path, &Config::default(), options).unwrap();

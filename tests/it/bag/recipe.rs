@@ -14,7 +14,11 @@ use salient_stereo::ros::message::sensor_msgs::{self, CameraInfo, CompressedImag
 use salient_stereo::ros::message::std_msgs::Header;
 use salient_stereo::stamp::Stamp;
 
+pub type Spoil = fn(usize, &mut sensor_msgs::Image);
+pub type Miscalibrate = fn(&mut CameraInfo, &mut CameraInfo);
+
 #[derive(Clone)]
+#[allow(clippy::struct_excessive_bools, reason = "one switch per oddity of a bag")]
 pub struct Recipe {
     pub frames: usize,
     pub first: usize,
@@ -33,9 +37,9 @@ pub struct Recipe {
     pub backwards: bool,
     pub size: Size,
     /// Changes the left image of each frame.
-    pub spoil: fn(usize, &mut sensor_msgs::Image),
+    pub spoil: Spoil,
     /// Changes the camera infos.
-    pub miscalibrate: fn(&mut CameraInfo, &mut CameraInfo),
+    pub miscalibrate: Miscalibrate,
     /// Stamp of each frame, nanoseconds.
     pub clock: fn(usize) -> i64,
     /// When each frame was recorded, if not at its stamp, nanoseconds.
