@@ -166,7 +166,7 @@ fn trust(evidence: u8, moved: i32) -> f32 {
     if moved > STEPS { 0.5 * trust } else { trust }
 }
 
-/// Drops disparities that the right view contradicts.
+/// Drops disparities that are not unique or that the right view contradicts.
 fn check_row(
     matches: &Matches,
     y: usize,
@@ -175,18 +175,19 @@ fn check_row(
     out: &mut [i16],
 ) {
     let left = matches.left.row(y);
-    let Some(max_difference) = max_difference else {
-        out.copy_from_slice(left);
-        return;
-    };
     let right = matches.right.row(y);
+    let evidence = matches.evidence.row(y);
     for (x, (out, &d)) in
         out.iter_mut().zip(left).enumerate().take(area.columns.end).skip(area.columns.start)
     {
         *out = NO_MATCH;
-        if d == NO_MATCH {
+        if d == NO_MATCH || evidence[x] == 0 {
             continue;
         }
+        let Some(max_difference) = max_difference else {
+            *out = d;
+            continue;
+        };
         let partner = x as i32 - ((i32::from(d) + STEPS / 2) >> STEPS.trailing_zeros());
         // A partner outside the right image can neither agree nor contradict.
         let agreed = match usize::try_from(partner) {

@@ -231,7 +231,9 @@ fn random_matches(size: Size, seed: u64) -> Matches {
             last
         })
     };
-    Matches { left: image(), right: image(), evidence: Image::filled(size, 128) }
+    let (left, right) = (image(), image());
+    let evidence = Image::from_fn(size, |_, _| if noise.next() % 8 == 0 { 0 } else { 128 });
+    Matches { left, right, evidence }
 }
 
 fn rig(size: Size) -> StereoRig {

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use crate::image::Image;
-use crate::simd::{Block, LANES, Level, Simd, dispatch, load_block};
+use crate::simd::{Block, LANES, Level, Simd, dispatch};
 use crate::stage::stereo::block::{self, Measure};
 use crate::stage::stereo::census::Census;
 use crate::stage::stereo::cost::Penalties;
@@ -246,8 +246,9 @@ impl Scratch {
                 for y in 0..shape.rows {
                     for k in 0..shape.tiles.len() {
                         let floors = *volume.floor_mut(k, y);
-                        finish.row(simd, k, y, volume.row_mut(k, y), &floors);
+                        finish.row(simd, k, y, volume.row(k, y), &floors);
                     }
+                    finish.vote(simd, y, volume);
                 }
             }
         }
@@ -267,6 +268,13 @@ pub struct Finish<'a> {
 }
 
 impl Finish<'_> {
+    /// Right winners of row `y`, once all its tiles are finished.
+    #[inline(always)]
+    pub fn vote<S: Simd>(&mut self, simd: S, y: usize, volume: &Volume) {
+        let width = self.views.left.width();
+        self.right.vote(simd, (self.x0, y), width, self.shape.tiles, volume);
+    }
+
     /// Takes the sums of row `y` of tile `k`.
     #[inline(always)]
     pub fn row<S: Simd>(
@@ -280,10 +288,7 @@ impl Finish<'_> {
         let width = self.views.left.width();
         let x = self.x0 + k * LANES;
         let inside = (width - x).min(LANES);
-        let mut outside = [255; LANES];
-        outside[..inside].fill(0);
         let lo = self.shape.tiles[k].lo;
-        self.right.vote(simd, (x, y), lo, costs, load_block(simd, &outside));
         let found = winners(simd, costs, lo, floors, self.uniqueness_ratio);
         let at = y * width + x;
         let left = &mut self.left[at..at + inside];

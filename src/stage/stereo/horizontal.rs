@@ -64,7 +64,7 @@ impl Horizontal {
                         lanes.copy_from_slice(&census.planes(shape.row(i))[at..at + LANES]);
                     }
                     let columns = transpose(simd, &block);
-                    for (i, column) in columns.into_iter().enumerate() {
+                    for (i, column) in columns.iter().enumerate() {
                         column.store_array(&mut out[(x + i) * PLANES + plane]);
                     }
                 }
@@ -75,7 +75,7 @@ impl Horizontal {
             for (i, lanes) in block.iter_mut().enumerate() {
                 lanes.copy_from_slice(&left.gray(shape.row(i))[LANES + x..2 * LANES + x]);
             }
-            for (i, column) in transpose(simd, &block).into_iter().enumerate() {
+            for (i, column) in transpose(simd, &block).iter().enumerate() {
                 column.store_array(&mut self.gray[x + i]);
             }
         }
@@ -114,6 +114,7 @@ impl Horizontal {
         floor: u8x32<S>,
         p1: u8x32<S>,
         p2: u8x32<S>,
+        mut out: Option<(&mut [[Block; LANES]], usize)>,
     ) -> u8x32<S> {
         let n = state.len() - 2;
         let mut smaller = entering(simd, &state[0], floor, p2);
@@ -127,6 +128,9 @@ impl Horizontal {
             let right = load_descriptors(simd, descriptor);
             let cost = hamming(left, &right) + same.min(smaller.min(larger) + p1);
             cost.store_array(&mut state[i + 1]);
+            if let Some((out, column)) = &mut out {
+                cost.store_array(&mut out[i][*column]);
+            }
             least = least.min(cost);
             smaller = same;
             same = larger;
@@ -142,7 +146,8 @@ impl Horizontal {
         penalties: Penalties,
         seeds: Option<&Seeds<'_>>,
     ) {
-        self.both.resize(shape.blocks_in_columns(), [0; LANES]);
+        let mut both = std::mem::take(&mut self.both);
+        both.resize(shape.blocks_in_columns(), [0; LANES]);
         self.floor.resize(shape.width(), [0; LANES]);
         if let Some(seeds) = seeds {
             seeds.fill_column(&shape.tiles[0], shape, seeds.left, penalties.p2, &mut self.state);
@@ -151,6 +156,7 @@ impl Horizontal {
         let mut out = 0;
         for (k, tile) in shape.tiles.iter().enumerate() {
             let base = tile.lo - shape.lo;
+            let tile_out = both[out..out + tile.n * LANES].as_chunks_mut::<LANES>().0;
             for column in 0..LANES {
                 let x = k * LANES + column;
                 let lanes = self.penalties(simd, penalties, x);
@@ -160,17 +166,16 @@ impl Horizontal {
                 let left = self.left_at(simd, x);
                 let right = &self.right[shape.right_from(x, tile) * PLANES..];
                 let state = &mut self.state[base..base + tile.n + 2];
-                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2);
+                let out = (&mut tile_out[..tile.n], column);
+                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2, Some(out));
                 floor.store_array(&mut self.floor[x]);
-                for i in 0..tile.n {
-                    self.both[out + i * LANES + column] = self.state[base + 1 + i];
-                }
                 if column == 0 {
                     self.forget_outside(base, tile.n);
                 }
             }
             out += tile.n * LANES;
         }
+        self.both = both;
     }
 
     /// Forgets what an adjacent tile left at disparities this one has not.
@@ -216,7 +221,7 @@ impl Horizontal {
                 let left = self.left_at(simd, x);
                 let right = &self.right[shape.right_from(x, tile) * PLANES..];
                 let state = &mut self.state[base..base + tile.n + 2];
-                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2);
+                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2, None);
                 let forward_floor = load_block(simd, &self.floor[x]);
                 (floor + forward_floor).store_array(&mut floors[column]);
                 for i in 0..tile.n {
@@ -235,11 +240,11 @@ impl Horizontal {
             for (i, block) in
                 self.both[start..start + tile.n * LANES].as_chunks::<LANES>().0.iter().enumerate()
             {
-                for (y, row) in transpose(simd, block).into_iter().enumerate() {
+                for (y, row) in transpose(simd, block).iter().enumerate() {
                     row.store_array(&mut sums[y * stride + i]);
                 }
             }
-            for (y, row) in transpose(simd, &floors).into_iter().enumerate() {
+            for (y, row) in transpose(simd, &floors).iter().enumerate() {
                 let floor = volume.floor_mut(k, y);
                 for (out, value) in floor.iter_mut().zip(row.to_array()) {
                     *out = value as u16;

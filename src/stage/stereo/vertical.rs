@@ -122,7 +122,10 @@ impl Vertical {
                 }
                 add_floors(volume.floor_mut(k, y), floor);
                 let floors = *volume.floor_mut(k, y);
-                finish.row(simd, k, y, volume.row_mut(k, y), &floors);
+                finish.row(simd, k, y, volume.row(k, y), &floors);
+            }
+            if row < shape.context_above + shape.rows {
+                finish.vote(simd, row - shape.context_above, volume);
             }
             self.turn();
         }

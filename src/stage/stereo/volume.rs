@@ -119,6 +119,14 @@ impl Volume {
         &mut blocks[y * n..(y + 1) * n]
     }
 
+    /// One row of one tile, to be read.
+    #[inline(always)]
+    pub fn row(&self, tile: usize, y: usize) -> &[Block] {
+        let blocks = &self.sums[self.starts[tile]..self.starts[tile + 1]];
+        let n = blocks.len() / BAND;
+        &blocks[y * n..(y + 1) * n]
+    }
+
     /// Sums of minima of one row of one tile.
     #[inline(always)]
     pub fn floor_mut(&mut self, tile: usize, y: usize) -> &mut [u16; LANES] {

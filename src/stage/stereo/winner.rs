@@ -3,6 +3,8 @@
 use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, load, load_block, store, u8x32};
 use crate::stage::stereo::NO_MATCH;
+use crate::stage::stereo::plan::Tile;
+use crate::stage::stereo::volume::Volume;
 
 /// Units of [`crate::perception::DISPARITY_STEP`] per pixel.
 pub const STEPS: i32 = 32;
@@ -40,29 +42,47 @@ impl RightWinner {
         self.index.resize(self.stride * rows, 0);
     }
 
-    /// The 32 left pixels from column `x` of row `y` cost `costs[i]` at
-    /// disparity `lo + i`. `outside` is 255 for lanes beyond the image.
+    /// The left pixels of row `y` from column `x0` on vote, all tiles of a run.
+    /// Lanes from column `width` on are no pixels.
+    ///
+    /// The loop over disparities is the outer one: with it inside, every vector
+    /// would be loaded again one byte beside where it has just been stored,
+    /// which stalls the processor's store forwarding.
     #[inline(always)]
     pub fn vote<S: Simd>(
         &mut self,
         simd: S,
-        (x, y): (usize, usize),
-        lo: usize,
-        costs: &[Block],
-        outside: u8x32<S>,
+        (x0, y): (usize, usize),
+        width: usize,
+        tiles: &[Tile],
+        volume: &Volume,
     ) {
         let row = y * self.stride;
         let cost_row = &mut self.cost[row..row + self.stride];
         let index_row = &mut self.index[row..row + self.stride];
-        for (i, cost) in costs.iter().enumerate() {
-            let cost = load_block(simd, cost) | outside;
-            let at = x + self.pad - (lo + i);
-            let best = load(simd, cost_row, at);
-            let index = load(simd, index_row, at);
-            let mine = u8x32::splat(simd, ((lo + i - self.lo) >> self.shift) as u8);
-            let better = cost.simd_lt(best);
-            store(cost_row, at, cost.min(best));
-            store(index_row, at, better.select(mine, index));
+        let (pad, lo, shift) = (self.pad, self.lo, self.shift);
+        let from = tiles.iter().map(|t| t.lo).min().unwrap_or(0);
+        let to = tiles.iter().map(|t| t.lo + t.n).max().unwrap_or(0);
+        for d in from..to {
+            let mine = u8x32::splat(simd, ((d - lo) >> shift) as u8);
+            for (k, tile) in tiles.iter().enumerate() {
+                if d < tile.lo || d >= tile.lo + tile.n {
+                    continue;
+                }
+                let mut cost = load_block(simd, &volume.row(k, y)[d - tile.lo]);
+                let x = x0 + k * LANES;
+                if x + LANES > width {
+                    let mut outside = [255; LANES];
+                    outside[..width - x].fill(0);
+                    cost = cost | load_block(simd, &outside);
+                }
+                let at = x + pad - d;
+                let best = load(simd, cost_row, at);
+                let index = load(simd, index_row, at);
+                let better = cost.simd_lt(best);
+                store(cost_row, at, cost.min(best));
+                store(index_row, at, better.select(mine, index));
+            }
         }
     }
 
@@ -122,27 +142,33 @@ pub fn winners<S: Simd>(
         second = second.min(distance.simd_le(one).select(u8x32::splat(simd, 255), cost));
     }
     let (best, second, index) = (best.to_array(), second.to_array(), index.to_array());
-    let mut out = Winners { disparity: [NO_MATCH; LANES], evidence: [0; LANES] };
+    // What follows is arithmetic of single pixels; each loop is over lanes and
+    // without branches, so that it becomes vector code as well.
+    let mut place = [0_usize; LANES];
+    let (mut smaller, mut larger) = ([0_u8; LANES], [0_u8; LANES]);
     for lane in 0..LANES {
-        let c0 = best[lane];
-        if c0 == 255 {
-            continue;
-        }
         let mut i = (index[lane] as usize) << shift;
-        while costs[i][lane] != c0 {
+        while shift > 0 && best[lane] < 255 && costs[i][lane] != best[lane] {
             i += 1;
         }
-        let (first, other) =
-            (c0 as u32 + floors[lane] as u32, second[lane] as u32 + floors[lane] as u32);
-        if other * 100 < first * (100 + uniqueness_ratio) {
-            out.evidence[lane] = 0;
-        } else {
-            out.evidence[lane] = (255 * (other - first) / other.max(1)).clamp(1, 255) as u8;
-        }
-        let c0 = c0 as i32;
-        let smaller = if i > 0 { costs[i - 1][lane] as i32 } else { c0 };
-        let larger = if i + 1 < n { costs[i + 1][lane] as i32 } else { c0 };
-        out.disparity[lane] = ((lo + i) as i32 * STEPS + sub_step(smaller, c0, larger)) as i16;
+        place[lane] = i;
+        smaller[lane] = if i > 0 { costs[i - 1][lane] } else { best[lane] };
+        larger[lane] = if i + 1 < n { costs[i + 1][lane] } else { best[lane] };
+    }
+    let mut out = Winners { disparity: [NO_MATCH; LANES], evidence: [0; LANES] };
+    for lane in 0..LANES {
+        let steps = sub_steps(smaller[lane], best[lane], larger[lane]);
+        let disparity = (lo + place[lane]) as i32 * STEPS + steps;
+        out.disparity[lane] = if best[lane] == 255 { NO_MATCH } else { disparity as i16 };
+    }
+    for lane in 0..LANES {
+        let first = (best[lane] as u16 + floors[lane]) as f32;
+        let other = (second[lane] as u16 + floors[lane]) as f32;
+        // Exact where it matters: both are whole numbers below 2000, so that a
+        // quotient that is no whole number is no neighbour of one either.
+        let evidence = (255.0 * (other - first) / other.max(1.0)).clamp(1.0, 255.0) as u8;
+        let unique = other * 100.0 >= first * (100 + uniqueness_ratio) as f32;
+        out.evidence[lane] = if unique && best[lane] != 255 { evidence } else { 0 };
     }
     out
 }
@@ -150,12 +176,9 @@ pub fn winners<S: Simd>(
 /// Offset of the minimum from its sample, in 1/32 px, under two lines of equal
 /// and opposite slope through the three costs (equiangular fit).
 #[inline(always)]
-fn sub_step(smaller: i32, least: i32, larger: i32) -> i32 {
-    let rise = smaller.max(larger) - least;
-    if rise <= 0 || smaller < least || larger < least {
-        return 0;
-    }
-    let twice = (smaller - larger) * STEPS;
-    // Rounded to the nearest step, away from zero at halves.
-    (twice + rise * twice.signum()) / (2 * rise)
+fn sub_steps(smaller: u8, least: u8, larger: u8) -> i32 {
+    let rise = (smaller.max(larger) - least) as f32;
+    let exact = (STEPS / 2) as f32 * (smaller as f32 - larger as f32) / rise.max(1.0);
+    // Rounded to the nearest step, away from zero at halves; the cast cuts.
+    (exact + 0.5_f32.copysign(exact)) as i32
 }

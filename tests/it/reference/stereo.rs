@@ -336,7 +336,10 @@ pub fn refined(matches: &Matches, config: &Config) -> Image<f32> {
     let size = matches.left.size();
     let checked = Image::from_fn(size, |x, y| {
         let d = matches.left.get(x, y);
-        if d == NO_MATCH || config.stereo.disp12_max_diff < 0 {
+        if d == NO_MATCH || matches.evidence.get(x, y) == 0 {
+            return NO_MATCH;
+        }
+        if config.stereo.disp12_max_diff < 0 {
             return d;
         }
         let partner = x as f64 - (f64::from(d) / 32.0 + 0.5).floor();

@@ -1,0 +1,287 @@
+#!/usr/bin/env python3
+"""Stereo accuracy and speed beside OpenCV's matchers, on the same images in the same run.
+
+    pip install opencv-python-headless numpy mcap mcap-ros2-support
+    python benches/peers/stereo.py KITTI_FOLDER --scene 000027 --bag out.mcap
+    python benches/peers/stereo.py KITTI_FOLDER --scene 000027 --tool target/release/salient_stereo
+
+KITTI_FOLDER holds training/image_0, image_1 (or colour image_2, image_3), disp_noc and disp_occ
+(disp_noc_0 and disp_occ_0 in the 2015 layout). A Middlebury folder (im0.png, im1.png, disp0GT.pfm,
+mask0nocc.png) is taken as it is.
+
+With --bag our disparity is read from an output bag of `salient_stereo replay` (topic /disparity) and scored
+where we matched; with --tool the script runs the tool itself: `export-bag` and `replay` for the disparity of the
+full frame (KITTI only), scored in centred rectangles as well, and `bench` for the time. Prints Markdown.
+
+Columns: EPE is the mean error in px, D1 the share of errors above 3 px and 5 %, bad-2 that above 2 px, all on
+non-occluded pixels that the method itself calls valid; "dense" is their share of the true pixels. "Same" columns
+are on the pixels where both this method and we are valid: this method / we. "Filled" ones are over all true
+pixels (occluded ones included) after every hole took the smaller disparity of its row neighbours.
+"""
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+STEP = 16.0
+
+
+def opencv_matchers(disparities):
+    """Name -> matcher, with the settings of OpenCV's own sample for SGBM (block 5)."""
+    block = 5
+    p1, p2 = 8 * block * block, 32 * block * block
+
+    def sgbm(mode, speckle):
+        return cv2.StereoSGBM_create(
+            0, disparities, block, p1, p2, 1, 63, 10, 100 if speckle else 0, 2 if speckle else 0, mode)
+
+    block_matcher = cv2.StereoBM_create(disparities, 15)
+    return {
+        "SGBM": sgbm(cv2.STEREO_SGBM_MODE_SGBM, False),
+        "SGBM + speckle filter": sgbm(cv2.STEREO_SGBM_MODE_SGBM, True),
+        "SGBM_3WAY": sgbm(cv2.STEREO_SGBM_MODE_SGBM_3WAY, False),
+        "BM 15": block_matcher,
+    }
+
+
+def read_pfm(path):
+    with open(path, "rb") as file:
+        file.readline()
+        width, height = map(int, file.readline().split())
+        scale = float(file.readline())
+        data = np.frombuffer(file.read(), "<f4" if scale < 0 else ">f4").reshape(height, width)
+    data = data[::-1].astype(np.float32)
+    return np.where(np.isfinite(data), data, 0)
+
+
+def read_kitti_disparity(path):
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        sys.exit(f"{path}: cannot be read as an image")
+    return image.astype(np.float32) / 256
+
+
+class Scene:
+    """One pair with its truth: `noc` and `occ` in px, 0 where unknown."""
+
+    def __init__(self, folder, scene, frame):
+        folder = Path(folder)
+        self.kitti = None
+        if (folder / "im0.png").exists():
+            self.left, self.right = folder / "im0.png", folder / "im1.png"
+            self.occ = read_pfm(folder / "disp0GT.pfm")
+            visible = cv2.imread(str(folder / "mask0nocc.png"), cv2.IMREAD_GRAYSCALE)
+            self.noc = self.occ * (visible == 255)
+            self.name = folder.name
+            return
+        training = folder / "training" if (folder / "training").is_dir() else folder
+        left, right = ("image_0", "image_1") if (training / "image_0").is_dir() else ("image_2", "image_3")
+        name = f"{scene}_{frame}.png"
+        self.left, self.right = training / left / name, training / right / name
+        suffix = "" if (training / "disp_noc").is_dir() else "_0"
+        self.noc = read_kitti_disparity(training / f"disp_noc{suffix}" / name)
+        self.occ = read_kitti_disparity(training / f"disp_occ{suffix}" / name)
+        self.name = f"{scene}_{frame}"
+        self.kitti = (folder, scene, frame)
+
+    def position(self):
+        """Number of this pair among those of its scene, which is its number in a bag of the scene."""
+        if self.kitti is None:
+            return 0
+        _, name, _ = self.kitti
+        return sorted(p.stem for p in self.left.parent.glob(f"{name}_*.png")).index(self.name)
+
+
+def centred(shape, fraction):
+    height, width = shape
+    side = np.sqrt(fraction)
+    h, w = int(height * side), int(width * side)
+    mask = np.zeros(shape, bool)
+    y, x = (height - h) // 2, (width - w) // 2
+    mask[y:y + h, x:x + w] = True
+    return mask
+
+
+def filled(disparity):
+    out = disparity.copy()
+    for row in out:
+        known = np.flatnonzero(~np.isnan(row))
+        if known.size == 0:
+            row[:] = 0
+            continue
+        holes = np.flatnonzero(np.isnan(row))
+        after = np.searchsorted(known, holes)
+        left = row[known[np.clip(after - 1, 0, known.size - 1)]]
+        right = row[known[np.clip(after, 0, known.size - 1)]]
+        both = np.minimum(left, right)
+        row[holes] = np.where(after == 0, right, np.where(after == known.size, left, both))
+    return out
+
+
+def errors(disparity, truth, mask):
+    """EPE, D1 %, bad-2 %, density % over the true pixels of `mask`."""
+    true = (truth > 0) & mask
+    valid = true & ~np.isnan(disparity)
+    if not valid.any():
+        return (float("nan"),) * 3 + (0.0,)
+    error = np.abs(disparity - truth)[valid]
+    d1 = (error > 3) & (error > 0.05 * truth[valid])
+    return error.mean(), 100 * d1.mean(), 100 * (error > 2).mean(), 100 * valid.sum() / true.sum()
+
+
+def sparsification(disparity, confidence, truth, mask):
+    """AUSE: area between error curves when pixels go by confidence and by true error (both as shares of the EPE)."""
+    valid = (truth > 0) & mask & ~np.isnan(disparity) & (confidence > 0)
+    if valid.sum() < 100:
+        return float("nan")
+    error = np.abs(disparity - truth)[valid]
+
+    def curve(order):
+        kept = error[order]
+        return np.array([kept[int(len(kept) * share):].mean() for share in np.arange(0, 1, 0.05)]) / error.mean()
+
+    by_confidence = curve(np.argsort(confidence[valid], kind="stable"))
+    by_error = curve(np.argsort(-error, kind="stable"))
+    return float((by_confidence - by_error).mean())
+
+
+def read_bag(path, frame):
+    """Disparity and confidence of pair number `frame` of an output bag (NaN and 0 where there is none)."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    disparity, confidence = [], []
+    with open(path, "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        topics = ["/disparity", "/confidence/image_rect"]
+        for _, channel, _, message in reader.iter_decoded_messages(topics=topics):
+            image = message.image if channel.topic == "/disparity" else message
+            rows = np.frombuffer(bytes(image.data), np.uint8).reshape(image.height, image.step)
+            pixels = rows[:, : 4 * image.width].copy().view("<f4")
+            if channel.topic == "/disparity":
+                pixels[pixels < message.min_disparity] = np.nan
+                disparity.append(pixels)
+            else:
+                confidence.append(pixels)
+    if not -len(disparity) <= frame < len(disparity):
+        sys.exit(f"{path}: {len(disparity)} disparity images, number {frame} wanted")
+    return disparity[frame], confidence[frame] if len(confidence) == len(disparity) else None
+
+
+def replay(tool, scene, disparities, work):
+    """Runs our own matcher over the full frame; returns disparity and confidence."""
+    folder, name, frame = scene.kitti
+    kind = "kitti2012" if (Path(folder) / "training" / "image_0").is_dir() else "kitti2015"
+    bag, out = work / "in.mcap", work / "out.mcap"
+
+    def run(*args):
+        subprocess.run([str(a) for a in (tool, *args)], check=True, stdout=subprocess.DEVNULL)
+
+    run("export-bag", "--dataset", kind, "--scene", name, folder, "-o", bag)
+    run("replay", bag, "-o", out, "--set", "saliency.mode=full_frame",
+        "--set", f"stereo.disparity_range={disparities}")
+    return read_bag(out, scene.position())
+
+
+def bench(tool, scene, fraction, disparities, frames, threads):
+    """p50 of matching in ms, by our own clock."""
+    command = [tool, "bench", "--left", scene.left, "--right", scene.right, "--roi", fraction,
+               "--disparities", disparities, "--threads", threads, "--frames", frames, "--json", "-"]
+    text = subprocess.run([str(a) for a in command], check=True, capture_output=True, text=True).stdout
+    matching = json.loads(text)["matching_ms"]
+    return matching["p50"] if isinstance(matching, dict) else matching
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", help="KITTI 2012/2015 folder, or a Middlebury scene folder")
+    parser.add_argument("--scene", default="000027", help="KITTI scene number")
+    parser.add_argument("--frame", default="10", help="KITTI frame number (the one with truth is 10)")
+    parser.add_argument("--bag", help="output bag of `salient_stereo replay` over the whole scene")
+    parser.add_argument("--bag-frame", type=int, help="number of the pair in the bag (default: found by frame number)")
+    parser.add_argument("--tool", help="salient_stereo executable, to measure accuracy of rectangles and time")
+    parser.add_argument("--roi", type=float, action="append", help="share of the centred rectangle (0.25 and 1)")
+    parser.add_argument("--disparities", type=int, default=192)
+    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds of timing")
+    args = parser.parse_args()
+    if not args.bag and not args.tool:
+        parser.error("give --bag, --tool, or both")
+
+    cv2.setNumThreads(1)
+    scene = Scene(args.folder, args.scene, args.frame)
+    left = cv2.imread(str(scene.left), cv2.IMREAD_GRAYSCALE)
+    right = cv2.imread(str(scene.right), cv2.IMREAD_GRAYSCALE)
+    if left is None or right is None:
+        sys.exit(f"{scene.left} or {scene.right} cannot be read")
+    matchers = opencv_matchers(args.disparities)
+    fractions = args.roi or [0.25, 1.0]
+    height, width = left.shape
+    print(f"### {scene.name}: {width}x{height}, 0..{args.disparities}, OpenCV {cv2.__version__}, one thread\n")
+
+    # Time: one round is every matcher once, so that all meet the same machine.
+    times = {name: [] for name in matchers}
+    ours = {(fraction, threads): [] for fraction in fractions for threads in (1, 2)}
+    found = {}
+    for _ in range(args.rounds):
+        for name, matcher in matchers.items():
+            start = time.perf_counter()
+            raw = matcher.compute(left, right)
+            times[name].append(1e3 * (time.perf_counter() - start))
+            found[name] = np.where(raw < 0, np.nan, raw.astype(np.float32) / STEP)
+        if args.tool:
+            for fraction, threads in ours:
+                ours[fraction, threads].append(
+                    bench(args.tool, scene, fraction, args.disparities, 10, threads))
+    reference = statistics.median(times["SGBM"])
+    print("| matcher | matching ms (median) | times faster than SGBM |\n|---|---|---|")
+    for name, values in times.items():
+        middle = statistics.median(values)
+        print(f"| OpenCV {name}, full frame | {middle:.1f} | {reference / middle:.1f} |")
+    for (fraction, threads), values in ours.items():
+        if values:
+            middle = statistics.median(values)
+            where = "full frame" if fraction >= 1 else f"centred {100 * fraction:.0f} % + border"
+            plural = "s" if threads > 1 else ""
+            print(f"| salient_stereo, {where}, {threads} thread{plural} | {middle:.2f} | {reference / middle:.1f} |")
+    print()
+
+    jobs = []
+    if args.bag:
+        frame = args.bag_frame
+        if frame is None:
+            frame = scene.position()
+        disparity, confidence = read_bag(args.bag, frame)
+        jobs.append(("where the bag has disparity", ~np.isnan(disparity), disparity, confidence))
+    if args.tool and scene.kitti:
+        with tempfile.TemporaryDirectory() as work:
+            disparity, confidence = replay(args.tool, scene, args.disparities, Path(work))
+        for fraction in fractions:
+            where = "full frame" if fraction >= 1 else f"centred {100 * fraction:.0f} %"
+            jobs.append((where, centred(left.shape, fraction), disparity, confidence))
+    for where, mask, disparity, confidence in jobs:
+        print(f"**{where}**\n")
+        print("| matcher | EPE px | D1 % | bad-2 % | dense % | same EPE: it / we | same D1: it / we "
+              "| filled EPE | filled D1 % |\n|---|---|---|---|---|---|---|---|---|")
+        for name, other in [("salient_stereo", disparity), *((f"OpenCV {n}", d) for n, d in found.items())]:
+            epe, d1, bad, dense = errors(other, scene.noc, mask)
+            same = mask & ~np.isnan(other) & ~np.isnan(disparity)
+            it, we = errors(other, scene.noc, same), errors(disparity, scene.noc, same)
+            all_epe, all_d1, _, _ = errors(filled(other), scene.occ, mask)
+            print(f"| {name} | {epe:.3f} | {d1:.2f} | {bad:.2f} | {dense:.1f} | {it[0]:.3f} / {we[0]:.3f} "
+                  f"| {it[1]:.2f} / {we[1]:.2f} | {all_epe:.3f} | {all_d1:.2f} |")
+        if confidence is not None:
+            area = sparsification(disparity, confidence, scene.noc, mask)
+            print(f"\nConfidence of salient_stereo: AUSE {area:.3f} (0: as good as knowing the error).")
+        print()
+
+
+if __name__ == "__main__":
+    main()
