@@ -346,6 +346,25 @@ fn truth_of_a_larger_picture_is_laid_over_smaller_views() {
 }
 
 #[test]
+fn a_coasted_region_is_scored_by_its_own_mask() {
+    // Not seen in this frame: no pixel in the label image, but a predicted mask.
+    let (observation, mut perception) = scene(Size::new(160, 60), 0, "left");
+    perception.labels.fill(0);
+    perception.regions[0].track_state = TrackState::Coasted;
+    perception.regions[1].mask.fill(0);
+    // A mask that reaches out of the image, or is shorter than its box, is clipped.
+    *perception.regions.push_empty() =
+        Region { x: 150, y: 55, width: 40, height: 30, mask: vec![255; 900], ..Region::default() };
+    *perception.regions.push_empty() = Region { x: 900, y: 900, ..Region::default() };
+    let mut sink = ScoreSink::new(1);
+    let score = sink.score(&observation, &perception).unwrap();
+    assert_eq!(score.matched, [(0, 1)]);
+    let regions = score.regions.unwrap();
+    assert_eq!((regions.true_positives, regions.false_positives), (1, 3));
+    assert_eq!(score.pixels.unwrap().recall, Some(0.0));
+}
+
+#[test]
 fn nothing_to_score_is_no_summary() {
     let mut sink = ScoreSink::new(1);
     let (mut observation, perception) = scene(Size::new(20, 10), 0, "left");

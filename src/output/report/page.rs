@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use serde_json::Value;
 
 use super::plot::Plot;
-use super::text::{count, escape, hex, ms, or_dash, percent, utc};
+use super::text::{count, escape, hex, metres, ms, or_dash, percent, utc};
 use super::{ReportSink, frames, scores, timing};
 use crate::config::{Config, SaliencyMode};
 use crate::output::picture::track_color;
@@ -154,7 +154,7 @@ fn kpis(report: &ReportSink) -> String {
             out += &kpi(
                 &percent(row.mean_relative_error),
                 "",
-                &format!("distance error · {:.2} m", row.mean_error_m),
+                &format!("distance error · {}", metres(row.mean_error_m)),
             );
         }
     }

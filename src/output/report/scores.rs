@@ -2,7 +2,7 @@
 
 use super::ReportSink;
 use super::plot::Plot;
-use super::text::{count, or_dash, percent};
+use super::text::{count, metres, or_dash, percent};
 use crate::metric::{DisparityScore, RegionScore};
 
 /// Scores against the truth; empty when the source knows none.
@@ -33,7 +33,7 @@ pub fn html(report: &ReportSink) -> String {
         rest.push(("objects at least 90 % inside", or_dash(roi.objects_90, percent)));
     }
     if let Some(distance) = summary.distance {
-        rest.push(("mean distance error", format!("{:.2} m", distance.mean_error_m)));
+        rest.push(("mean distance error", metres(distance.mean_error_m)));
         rest.push(("mean relative distance error", percent(distance.mean_relative_error)));
     }
     if let Some(switches) = summary.id_switches {

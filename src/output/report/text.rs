@@ -33,6 +33,11 @@ pub fn ms(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A length: centimetres below a metre.
+pub fn metres(value: f64) -> String {
+    if value < 1.0 { format!("{:.1} cm", value * 100.0) } else { format!("{value:.2} m") }
+}
+
 /// A share as a percentage.
 pub fn percent(value: f64) -> String {
     let percent = value * 100.0;

@@ -31,6 +31,7 @@
     return node;
   };
   const known = v => v !== null && v !== undefined;
+  const digits = v => v.toFixed(v < 1 ? 2 : v < 10 ? 1 : 0);
   const metres = v => known(v) ? v.toFixed(v < 10 ? 2 : 1) + ' m' : '–';
 
   // ---- one view --------------------------------------------------------------
@@ -108,11 +109,11 @@
       if (known(r.confidence)) meter.append(el('span', { class: 'meter', style: `--v:${r.confidence};--c:${r.color}` }), Math.round(r.confidence * 100) + '%'); else meter.append('–');
       const row = el('tr', { 'data-id': r.key }, id,
         el('td', { class: 'n' }, metres(r.distance) + spread),
-        el('td', { class: 'n opt' }, known(r.near) && known(r.far) ? r.near.toFixed(1) + '–' + r.far.toFixed(1) : '–'),
-        el('td', { class: 'n opt' }, r.size ? r.size.map(v => v.toFixed(v < 10 ? 1 : 0)).join(' × ') : '–'),
-        el('td', { class: 'n opt' }, known(r.speed) ? r.speed.toFixed(1) + ' m/s' : '–'),
         meter,
-        el('td', { class: 'n opt' }, known(r.saliency) ? r.saliency.toFixed(2) : '–'));
+        el('td', { class: 'n opt' }, r.size ? r.size.map(digits).join(' × ') : '–'),
+        el('td', { class: 'n opt' }, known(r.speed) ? digits(r.speed) + ' m/s' : '–'),
+        el('td', { class: 'n opt more' }, known(r.near) && known(r.far) ? digits(r.near) + '–' + digits(r.far) : '–'),
+        el('td', { class: 'n opt more' }, known(r.saliency) ? r.saliency.toFixed(2) : '–'));
       row.addEventListener('pointerenter', () => light(r.key));
       row.addEventListener('pointerleave', () => light(null));
       body.append(row);

@@ -61,46 +61,45 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Lays object ids over the labels; false when the sizes do not fit.
+    /// Lays object ids over the regions' masks; false when the sizes do not fit.
+    ///
+    /// The masks are those that are published with the regions: a coasted one
+    /// has no pixel in the label image, but claims the pixels of its mask.
     pub fn measure(&mut self, objects: &Image<u16>, perception: &Perception) -> bool {
-        let labels = &perception.labels;
-        let Some(factor) = factor(objects.size(), labels.size()) else { return false };
-        shrink(objects, factor, labels.size(), &mut self.objects);
+        let size = perception.labels.size();
+        let Some(factor) = factor(objects.size(), size) else { return false };
+        shrink(objects, factor, size, &mut self.objects);
         self.shared.clear();
         self.regions.clear();
         self.truths.clear();
-        let mut region_of: BTreeMap<u16, usize> = BTreeMap::new();
-        for (index, region) in perception.regions.iter().enumerate() {
-            region_of.insert(region.label, index);
-            // A coasted region may have a box, but no pixel in the label image.
-            let bounds = [region.x, region.y, region.width, region.height];
-            self.regions.push(Shape { index, bounds, ..Shape::default() });
-        }
         let mut truth_of: BTreeMap<u16, usize> = BTreeMap::new();
-        for y in 0..labels.height() {
-            let rows =
-                labels.row(y).iter().zip(self.objects.row(y)).zip(perception.roi.matched.row(y));
-            for (x, ((&label, &id), &matched)) in rows.enumerate() {
-                if label == 0 && id == 0 {
-                    continue;
-                }
-                let region = if label == 0 { None } else { region_of.get(&label).copied() };
-                if let Some(region) = region {
-                    self.regions[region].area += 1;
-                }
-                if id == 0 {
-                    continue;
-                }
+        for y in 0..size.height {
+            let row = self.objects.row(y).iter().zip(perception.roi.matched.row(y));
+            for (x, (&id, &matched)) in row.enumerate().filter(|(_, (id, _))| **id != 0) {
                 let truth = *truth_of.entry(id).or_insert_with(|| {
                     self.truths.push(Shape { id, ..Shape::default() });
                     self.truths.len() - 1
                 });
                 self.truths[truth].grow(x, y);
                 self.truths[truth].covered += u64::from(matched != 0);
-                if let Some(region) = region {
-                    *self.shared.entry((region, truth)).or_default() += 1;
+            }
+        }
+        for (index, region) in perception.regions.iter().enumerate() {
+            let bounds = [region.x, region.y, region.width, region.height];
+            let mut shape = Shape { index, bounds, ..Shape::default() };
+            let rows = region.mask.chunks_exact((region.width as usize).max(1));
+            for (y, row) in (region.y as usize..size.height).zip(rows) {
+                let left = (region.x as usize).min(size.width);
+                for (&id, _) in
+                    self.objects.row(y)[left..].iter().zip(row).filter(|(_, m)| **m != 0)
+                {
+                    shape.area += 1;
+                    if let Some(truth) = truth_of.get(&id) {
+                        *self.shared.entry((index, *truth)).or_default() += 1;
+                    }
                 }
             }
+            self.regions.push(shape);
         }
         true
     }
