@@ -101,6 +101,11 @@ impl Pipeline {
         self.preprocess.output_size()
     }
 
+    /// The ground plane of the last frame; `None` in modes that look for none.
+    pub fn ground(&self) -> Option<&Ground> {
+        self.saliency.ground()
+    }
+
     /// Forgets the previous frame and all tracks, as after a jump in time.
     pub fn reset(&mut self) {
         self.previous.clear();

@@ -4,17 +4,25 @@ use crate::camera::StereoRig;
 use crate::image::{Image, Size};
 use crate::stage::coarse::CELL;
 
-/// Share of the measured cells below the horizon that must lie on a plane to begin with.
-const ACQUIRE: f32 = 0.30;
+/// Share of the measured cells below the horizon that must lie on a plane to
+/// begin with: a street between parked cars shows a fifth.
+const ACQUIRE: f32 = 0.20;
 /// The same to go on with the last plane.
-const KEEP: f32 = 0.18;
+const KEEP: f32 = 0.12;
+/// Cells below a plane, in parts of those on it, beyond which it is no ground.
+const MAX_BELOW: f32 = 0.5;
+/// Part of the cells, from the bottom of the image, among which the first
+/// guesses are drawn.
+const LOWER_PART: f32 = 0.6;
+/// One in so many cells votes on the first guesses.
+const SKIP: usize = 4;
 /// Frames without support after which the last plane is given up.
 const PATIENCE: u32 = 10;
 /// Share of the new plane in the running one.
 const RENEWAL: f32 = 0.2;
 /// Planes tried per frame when there is none yet, and when there is one.
-const TRIALS: usize = 160;
-const TRIALS_NEAR: usize = 32;
+const TRIALS: usize = 240;
+const TRIALS_NEAR: usize = 48;
 /// Most cells that vote.
 const MAX_VOTERS: usize = 1600;
 /// Reweighted least-squares steps.
@@ -137,7 +145,7 @@ impl Ground {
     /// Looks for the plane in the checked disparity of each cell (full-size
     /// pixels, `x_l - x_r`; NaN where there is none).
     ///
-    /// Consensus of triples of cells (Fischler and Bolles 1981; the triples
+    /// Consensus of pairs and triples of cells (Fischler and Bolles 1981; the draws
     /// are a fixed sequence), nearest to the last plane first, then iteratively
     /// reweighted least squares. What lies below a candidate counts against
     /// it: nothing is under the ground.
@@ -201,24 +209,27 @@ impl Ground {
         consider(self.plane);
         // A fixed sequence (Knuth's MMIX generator): same input, same plane.
         let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let lower = ((n as f32 * LOWER_PART) as usize).max(1);
         let mut random = || {
             state = state
                 .wrapping_mul(6_364_136_223_846_793_005)
                 .wrapping_add(1_442_695_040_888_963_407);
-            ((state >> 33) as usize) % n
+            self.votes[n - 1 - ((state >> 33) as usize) % lower]
         };
         let trials = if self.plane.is_some() { TRIALS_NEAR } else { TRIALS };
-        for _ in 0..trials {
-            let (p, q, r) = (self.votes[random()], self.votes[random()], self.votes[random()]);
-            consider(through(p, q, r, rig));
+        for trial in 0..trials {
+            let (p, q) = (random(), random());
+            // Two cells give a level plane, which is nearly always right and
+            // needs fewer lucky draws; three give one with roll.
+            consider(if trial % 2 == 0 { level(p, q, rig) } else { through(p, q, random(), rig) });
         }
         best.1
     }
 
-    /// Votes on the plane less those below it.
+    /// Votes on the plane less those below it, of every few.
     fn score(&self, plane: &Plane) -> f32 {
         let mut score = 0.0;
-        for vote in &self.votes {
+        for vote in self.votes.iter().step_by(SKIP) {
             let at = plane.disparity(vote.u, vote.v);
             let difference = vote.d - at;
             let tolerance = tolerance(at);
@@ -254,7 +265,7 @@ impl Ground {
             let solution = normal.try_inverse()? * right;
             plane = plane_of(solution.x as f32, solution.y as f32, solution.z as f32, rig)?;
         }
-        let (mut on, mut all) = (0.0_f32, 0.0_f32);
+        let (mut on, mut all, mut below) = (0.0_f32, 0.0_f32, 0.0_f32);
         self.depths.clear();
         for vote in &self.votes {
             let at = plane.disparity(vote.u, vote.v);
@@ -262,12 +273,13 @@ impl Ground {
                 continue;
             }
             all += 1.0;
+            below += f32::from(u8::from(vote.d < at - tolerance(at)));
             if (vote.d - at).abs() < tolerance(at) {
                 on += 1.0;
                 self.depths.push(rig.depth_scale() as f32 / at);
             }
         }
-        if self.depths.len() < 20 {
+        if self.depths.len() < 20 || below > MAX_BELOW * on {
             return None;
         }
         let middle = self.depths.len() / 2;
@@ -286,6 +298,16 @@ fn plane_of(a: f32, b: f32, c: f32, rig: &StereoRig) -> Option<Plane> {
     let plausible =
         n[1] > MIN_UPRIGHT * length && n[0].abs() < MAX_ROLL * n[1] && HEIGHTS_M.contains(&height);
     plausible.then_some(Plane { a, b, c, camera_height_m: height, distance_m: 10.0 })
+}
+
+/// The plane without roll through two votes.
+fn level(p: Vote, q: Vote, rig: &StereoRig) -> Option<Plane> {
+    let dv = q.v - p.v;
+    if dv.abs() < 12.0 {
+        return None;
+    }
+    let a = (q.d - p.d) / dv;
+    plane_of(a, 0.0, p.d - a * p.v, rig)
 }
 
 fn through(p: Vote, q: Vote, r: Vote, rig: &StereoRig) -> Option<Plane> {
