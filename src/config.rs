@@ -196,7 +196,7 @@ group!(
 group!(
     /// `saliency.*`
     Saliency {
-        mode: SaliencyMode = SaliencyMode::Paper,
+        mode: SaliencyMode = SaliencyMode::Scene,
         paper: Paper = Paper::default(),
         threshold: f64 = 0.55,
         threshold_mode: ThresholdMode = ThresholdMode::Fixed,

@@ -26,6 +26,7 @@ mod it {
     mod report;
     mod roi;
     mod saliency;
+    mod scene;
     mod stereo;
     mod sync;
     #[cfg(feature = "tool")]

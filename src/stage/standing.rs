@@ -172,6 +172,8 @@ impl Standing {
                             top_m: height,
                             contact: carried || hidden || height <= CONTACT_M * scale,
                         });
+                        // It carries one segment only.
+                        carried = false;
                     }
                 }
             }

@@ -23,12 +23,16 @@ const FADE_OUT_M: f32 = 0.5;
 const LEAST_DISPARITY: f32 = 1.2;
 /// Distance in metres up to which nearness is 1.
 const NEAR_M: f32 = 25.0;
+/// Share of measured cells from which a frame counts as one with depth.
+const LEAST_MEASURED: f32 = 0.15;
 /// Cells of the smallest thing.
 const LEAST_CELLS: u32 = 4;
 /// Sum of the barriers of Y, Cb and Cr that counts fully.
 const FULL_BARRIER: f32 = 180.0;
+/// The same where there is no ground, and pictures are of things.
+const FULL_BARRIER_STILL: f32 = 120.0;
 /// Sum of Mahalanobis distances from three sides that counts fully.
-const FULL_BOUNDARY: f32 = 18.0;
+const FULL_BOUNDARY: f32 = 12.0;
 
 /// The mode with its cues.
 #[derive(Debug, Default)]
@@ -139,8 +143,16 @@ impl SceneSaliency {
         }
     }
 
+    /// No ground: what cannot be reached from the border, near the centre.
+    ///
+    /// A picture without disparity is of things more often than not, and the
+    /// boundary contrast helps: the geometric mean of both. With disparity a
+    /// bare table or wall may fill the view, whose shading the boundary
+    /// contrast takes for a thing: the barrier alone, and relief.
     fn run_without_plane(&mut self, scene: &AttentionScene<'_>, out: &mut Image<f32>) {
         self.boundary.run(&scene.cells.rgb, &mut self.border);
+        let measured = scene.coarse.checked.pixels().iter().filter(|d| **d >= 1.0).count();
+        let has_depth = measured as f32 >= LEAST_MEASURED * out.size().area() as f32;
         let (width, height) = (out.width() as f32, out.height() as f32);
         for y in 0..out.height() {
             let (color, border) = (self.color.row(y), self.border.row(y));
@@ -148,11 +160,15 @@ impl SceneSaliency {
             let v = (y as f32 + 0.5) / height - 0.5;
             for (x, out) in out.row_mut(y).iter_mut().enumerate() {
                 let u = (x as f32 + 0.5) / width - 0.5;
-                let centre = (-(u * u + v * v) * 4.0).exp();
-                let appearance = (color[x] / FULL_BARRIER).min(1.0)
-                    + (border[x] / FULL_BOUNDARY).min(1.0)
-                    + relief[x] / 255.0;
-                *out = (appearance * 0.5 * centre).min(1.0);
+                let radius = u * u + v * v;
+                let (appearance, spread) = if has_depth {
+                    ((color[x] / FULL_BARRIER).min(1.0) + 0.1 * relief[x] / 255.0, 2.0)
+                } else {
+                    let barrier = (color[x] / FULL_BARRIER_STILL).min(1.0);
+                    let contrast = (border[x] / FULL_BOUNDARY).min(1.0);
+                    (1.2 * (barrier * contrast).sqrt(), 4.0)
+                };
+                *out = (appearance * (-spread * radius).exp()).min(1.0);
             }
         }
     }

@@ -1,0 +1,178 @@
+//! Mode `scene`: the ground, what stands on it, and its cues.
+
+use salient_stereo::camera::{Camera, StereoRig};
+use salient_stereo::image::{Image, Size};
+use salient_stereo::stage::ground::{Ground, GroundState, cell_centre};
+use salient_stereo::stage::saliency::barrier::{Barrier, ycbcr};
+use salient_stereo::stage::saliency::lateral::Lateral;
+use salient_stereo::stage::standing::{Standing, Things};
+
+const SIZE: Size = Size::new(640, 240);
+const F: f64 = 400.0;
+const BASELINE: f64 = 0.5;
+const HEIGHT: f64 = 1.6;
+const HORIZON: f64 = 100.0;
+
+fn rig() -> StereoRig {
+    StereoRig::new(
+        Camera::pinhole(SIZE, F, 320.0, HORIZON, 0.0),
+        Camera::pinhole(SIZE, F, 320.0, HORIZON, -F * BASELINE),
+        0.0,
+    )
+    .unwrap()
+}
+
+/// A street under a camera rolled by `roll` radians, with a wall at 40 m and
+/// boxes of (left, right, bottom and top above the ground, distance) in metres.
+fn street(roll: f64, boxes: &[[f64; 5]]) -> Image<f32> {
+    Image::from_fn(SIZE.divided_by(4), |x, y| {
+        let (u, v) = cell_centre(x, y);
+        let (u, v) = (f64::from(u) - 320.0, f64::from(v) - HORIZON);
+        // Down in the world, from the rolled camera.
+        let down = v * roll.cos() + u * roll.sin();
+        let across = u * roll.cos() - v * roll.sin();
+        let mut z = 40.0_f64;
+        if down > 0.0 {
+            z = z.min(F * HEIGHT / down);
+        }
+        for [left, right, bottom, top, distance] in boxes {
+            let (lateral, height) = (across * distance / F, HEIGHT - down * distance / F);
+            if (*left..*right).contains(&lateral) && (*bottom..*top).contains(&height) {
+                z = z.min(*distance);
+            }
+        }
+        (F * BASELINE / z) as f32
+    })
+}
+
+#[test]
+fn the_ground_is_found_from_the_first_frame_also_with_roll() {
+    for roll in [-0.07, 0.0, 0.07] {
+        let mut ground = Ground::default();
+        ground.run(&street(roll, &[[-3.0, -1.0, 0.0, 1.5, 9.0]]), &rig());
+        let plane = ground.plane().expect("a street has a ground");
+        assert_eq!(ground.state(), GroundState::Measured);
+        assert!((plane.camera_height_m - HEIGHT as f32).abs() < 0.05, "{roll}: {plane:?}");
+        // Height of the box's upper edge.
+        let (u, v) = (320.0 - 2.0 / 9.0 * 400.0, HORIZON as f32 + 0.1 / 9.0 * 400.0);
+        let turned = (roll.cos() as f32, roll.sin() as f32);
+        let (du, dv) = (u - 320.0, v - HORIZON as f32);
+        let (u, v) =
+            (320.0 + du * turned.0 + dv * turned.1, HORIZON as f32 + dv * turned.0 - du * turned.1);
+        let height = plane.height(u, v, (F * BASELINE / 9.0) as f32);
+        assert!((height - 1.5).abs() < 0.1, "{roll}: {height}");
+    }
+}
+
+#[test]
+fn a_wall_is_no_ground_and_a_lost_ground_is_held_for_a_while() {
+    let rig = rig();
+    let wall = Image::filled(SIZE.divided_by(4), 20.0);
+    let mut ground = Ground::default();
+    ground.run(&wall, &rig);
+    assert_eq!(ground.state(), GroundState::None);
+
+    ground.run(&street(0.0, &[]), &rig);
+    let nothing = Image::filled(SIZE.divided_by(4), f32::NAN);
+    for _ in 0..10 {
+        ground.run(&nothing, &rig);
+        assert_eq!(ground.state(), GroundState::Held);
+        assert!(ground.plane().is_some());
+    }
+    ground.run(&nothing, &rig);
+    assert_eq!((ground.state(), ground.plane()), (GroundState::None, None));
+}
+
+#[test]
+fn what_stands_is_found_and_what_floats_is_counted() {
+    let rig = rig();
+    // A car, a pole, and a sign board that nothing carries, far apart.
+    let boxes =
+        [[-3.5, -1.5, 0.0, 1.5, 9.0], [1.4, 1.7, 0.0, 2.2, 7.0], [4.0, 6.0, 1.4, 2.4, 12.0]];
+    let disparity = street(0.0, &boxes);
+    let mut ground = Ground::default();
+    ground.run(&disparity, &rig);
+    let plane = *ground.plane().expect("a street has a ground");
+    let mut things = Things::default();
+    Standing::default().run(&disparity, &plane, &rig, 4, &mut things);
+
+    let at = |[left, right, bottom, top, distance]: [f64; 5]| {
+        let (x, h) = ((left + right) / 2.0, (bottom + top) / 2.0);
+        let u = 320.0 + F * x / distance;
+        let v = HORIZON + F * (HEIGHT - h) / distance;
+        things.ids.get(u as usize / 4, v as usize / 4)
+    };
+    let (car, pole) = (at(boxes[0]), at(boxes[1]));
+    assert!(car != 0 && pole != 0 && car != pole);
+    assert_eq!((at(boxes[2]), things.floating), (0, 1));
+    let car = things.list[car as usize - 1];
+    assert!((car.lateral_m[0] + 3.5).abs() < 0.2 && (car.lateral_m[1] + 1.5).abs() < 0.2);
+    assert!((car.top_m - 1.5).abs() < 0.15 && (car.depth_m[0] - 9.0).abs() < 0.2);
+    // The ground itself is none of them.
+    assert_eq!(things.ids.get(80, 58), 0);
+}
+
+/// The barrier of one channel over three raster scans, one value at a time.
+fn plain_barrier(values: &[u8], width: usize, height: usize) -> Vec<u8> {
+    let border = |x: usize, y: usize| x == 0 || y == 0 || x + 1 == width || y + 1 == height;
+    let mut high = values.to_vec();
+    let mut low = values.to_vec();
+    let mut best: Vec<u8> =
+        (0..values.len()).map(|i| if border(i % width, i / width) { 0 } else { 255 }).collect();
+    for pass in 0..3 {
+        let forward = pass % 2 == 0;
+        for k in 0..values.len() {
+            let i = if forward { k } else { values.len() - 1 - k };
+            if border(i % width, i / width) {
+                continue;
+            }
+            let neighbours = if forward { [i - width, i - 1] } else { [i + width, i + 1] };
+            for j in neighbours {
+                let (h, l) = (high[j].max(values[i]), low[j].min(values[i]));
+                if h - l < best[i] {
+                    (best[i], high[i], low[i]) = (h - l, h, l);
+                }
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn the_packed_barrier_equals_one_channel_at_a_time() {
+    let mut seed = 7_u32;
+    let mut random = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (seed >> 24) as u8
+    };
+    for (width, height) in [(1, 1), (2, 5), (3, 3), (17, 9), (40, 23)] {
+        let size = Size::new(width, height);
+        let rgb = Image::from_fn(size, |_, _| [random(), random(), random()]);
+        let fourth = Image::from_fn(size, |_, _| random());
+        let (mut color, mut extra) = (Image::default(), Image::default());
+        Barrier::default().run(&rgb, &fourth, &mut color, &mut extra);
+        let channel = |c: usize| rgb.pixels().iter().map(|&p| ycbcr(p)[c]).collect::<Vec<_>>();
+        let plain: Vec<_> = (0..3).map(|c| plain_barrier(&channel(c), width, height)).collect();
+        let fourth = plain_barrier(fourth.pixels(), width, height);
+        for i in 0..size.area() {
+            let sum: u16 = plain.iter().map(|p| u16::from(p[i])).sum();
+            assert_eq!(color.pixels()[i], f32::from(sum), "{size} pixel {i}");
+            assert_eq!(extra.pixels()[i], f32::from(fourth[i]), "{size} pixel {i}");
+        }
+    }
+}
+
+#[test]
+fn a_pole_stands_out_on_both_sides_and_a_wall_on_none() {
+    let size = Size::new(120, 4);
+    let disparity =
+        Image::from_fn(size, |x, y| if y < 2 && (50..53).contains(&x) { 20.0 } else { 5.0 });
+    let mut out = Image::default();
+    Lateral::default().run(&disparity, 2.0, 1.0, &mut out);
+    assert_eq!(out.get(51, 0), 1.0);
+    assert_eq!((out.get(51, 3), out.get(20, 0)), (0.0, 0.0));
+    // One side only counts half: (15 / 2) / (0.35 * 20) is still full, a small step is not.
+    let step = Image::from_fn(size, |x, _| if x < 60 { 20.0 } else { 18.0 });
+    Lateral::default().run(&step, 2.0, 1.0, &mut out);
+    assert!((out.get(58, 0) - 1.0 / 7.0).abs() < 1e-5, "{}", out.get(58, 0));
+}
