@@ -31,8 +31,8 @@ impl Simplify {
         while let Some((from, to)) = self.stack.pop() {
             let (a, b) = (points[from], points[to % n]);
             let mut worst = (limit, None);
-            for i in from + 1..to {
-                let distance = squared_distance(points[i], a, b);
+            for (i, &point) in points.iter().enumerate().take(to).skip(from + 1) {
+                let distance = squared_distance(point, a, b);
                 if distance > worst.0 {
                     worst = (distance, Some(i));
                 }
