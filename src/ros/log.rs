@@ -79,8 +79,8 @@ pub(crate) fn disconnect_rosout() {
     drop(old);
 }
 
-/// Set once a node leaves the graph: what the transport then says about its
-/// vanished counterparts and groups is of no use to anybody.
+/// Set when a node leaves the graph, until the next one joins: what the
+/// transport then says about vanished counterparts and groups is of no use.
 static LEAVING: AtomicBool = AtomicBool::new(false);
 
 /// Shows nothing of the transport libraries while a node takes itself down.

@@ -113,6 +113,7 @@ impl NodeRuntime {
         for note in &environment.notes {
             tracing::warn!("{note}");
         }
+        log::mute_transport(false);
         let mut node = RosNode::open(names.clone(), &environment, rosout)?;
         let clock = Arc::new(NodeClock::default());
         clock.simulate(config.use_sim_time);
@@ -272,9 +273,7 @@ impl NodeRuntime {
         log::mute_transport(true);
         self.stop.clear();
         self.graph = None;
-        let stopped = self.wait_for_threads();
-        log::mute_transport(false);
-        stopped
+        self.wait_for_threads()
     }
 
     fn wait_for_threads(&mut self) -> bool {

@@ -58,6 +58,9 @@ impl Worker {
             }
             let asked = self.resets.load(Ordering::Acquire);
             if asked != resets || pair.after_jump {
+                if pair.after_jump {
+                    tracing::warn!("stamps jumped back to {}: tracks start anew", pair.stamp);
+                }
                 resets = asked;
                 engine.reset();
             }
