@@ -95,7 +95,7 @@ fn every_method_equals_its_reference_at_every_level_and_odd_size() {
 
 #[test]
 fn ranges_beyond_a_byte_equal_the_reference() {
-    let size = Size::new(70, 34);
+    let size = Size::new(40, 6);
     let (left, right) = pair(size, 3);
     let views = Views { left: &left, right: &right, mask: None, coarse: None, weight: None };
     for search in [0..300, 511..1023] {

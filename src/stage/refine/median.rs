@@ -48,8 +48,8 @@ pub fn median_row<S: Simd>(simd: S, above: &[i16], here: &[i16], below: &[i16], 
         x += LANES;
     }
     out[0] = median_at(above, here, below, 0);
-    for x in x..width {
-        out[x] = median_at(above, here, below, x);
+    for (x, out) in out.iter_mut().enumerate().skip(x) {
+        *out = median_at(above, here, below, x);
     }
 }
 

@@ -83,7 +83,7 @@ struct Rows<'a> {
     width: usize,
 }
 
-impl<'a> Rows<'a> {
+impl Rows<'_> {
     fn split(self, y: usize) -> (Self, Self) {
         let at = (y - self.y0) * self.width;
         let (left, left_rest) = self.left.split_at_mut(at);

@@ -126,7 +126,7 @@ impl Plan {
         search: &Range<usize>,
     ) {
         self.columns.clear();
-        self.columns.resize(size.width, if mask.is_some() { 0 } else { 1 });
+        self.columns.resize(size.width, u8::from(mask.is_none()));
         if let Some(mask) = mask {
             for y in rows.clone() {
                 for (any, value) in self.columns.iter_mut().zip(mask.row(y)) {

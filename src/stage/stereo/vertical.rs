@@ -145,6 +145,7 @@ impl Vertical {
     }
 
     /// Paths enter the first row from the coarse disparities at image row `y`.
+    #[inline(always)]
     fn seed<const DIAGONALS: bool>(
         &mut self,
         shape: &RunShape<'_>,
@@ -153,10 +154,13 @@ impl Vertical {
         y: usize,
     ) {
         for (k, tile) in shape.tiles.iter().enumerate() {
-            let coarse: [f32; LANES] = std::array::from_fn(|i| seeds.at(k * LANES + i, y));
+            let mut coarse = [f32::NAN; LANES];
+            for (i, coarse) in coarse.iter_mut().enumerate() {
+                *coarse = seeds.at(k * LANES + i, y);
+            }
             for d in tile.lo..tile.lo + tile.n {
                 let at = self.index(shape, k, d);
-                let lanes = coarse.map(|c| Seeds::cost(c, d, penalties.p2));
+                let lanes = Seeds::costs(&coarse, d, penalties.p2);
                 self.straight.state[at..at + LANES].copy_from_slice(&lanes);
                 if DIAGONALS {
                     self.from_left[0].state[at..at + LANES].copy_from_slice(&lanes);

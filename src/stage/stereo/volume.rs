@@ -160,15 +160,16 @@ impl Seeds<'_> {
         self.coarse.get_clamped(((self.x0 + x) / CELL) as isize, (image_y / CELL) as isize)
     }
 
-    /// Start of a path: up to P2, growing with the distance from the coarse
+    /// Start of 32 paths: up to P2, growing with the distance from the coarse
     /// disparity; 255 where that is unknown, which stands for "anything".
     #[inline(always)]
-    pub fn cost(coarse: f32, d: usize, p2: u8) -> u8 {
-        if coarse.is_nan() {
-            255
-        } else {
-            ((coarse - d as f32).abs() * SEED_SLOPE).min(p2 as f32) as u8
+    pub fn costs(coarse: &[f32; LANES], d: usize, p2: u8) -> Block {
+        let mut out = [255; LANES];
+        for (out, &coarse) in out.iter_mut().zip(coarse) {
+            let cost = ((coarse - d as f32).abs() * SEED_SLOPE).min(p2 as f32) as u8;
+            *out = if coarse.is_nan() { 255 } else { cost };
         }
+        out
     }
 
     /// The state of a horizontal path before its first column.
@@ -181,11 +182,13 @@ impl Seeds<'_> {
         p2: u8,
         state: &mut [Block],
     ) {
-        let coarse: [f32; LANES] =
-            std::array::from_fn(|i| self.at(x, self.y0 + i.min(shape.rows - 1)));
+        let mut coarse = [f32::NAN; LANES];
+        for (i, coarse) in coarse.iter_mut().enumerate() {
+            *coarse = self.at(x, self.y0 + i.min(shape.rows - 1));
+        }
         for i in 0..tile.n {
             let d = tile.lo + i;
-            state[d - shape.lo + 1] = coarse.map(|c| Self::cost(c, d, p2));
+            state[d - shape.lo + 1] = Self::costs(&coarse, d, p2);
         }
     }
 }

@@ -74,7 +74,7 @@ impl RightWinner {
                 if x + LANES > width {
                     let mut outside = [255; LANES];
                     outside[..width - x].fill(0);
-                    cost = cost | load_block(simd, &outside);
+                    cost |= load_block(simd, &outside);
                 }
                 let at = x + pad - d;
                 let best = load(simd, cost_row, at);
