@@ -23,6 +23,8 @@ mod it {
     mod reference;
     mod regions;
     #[cfg(feature = "tool")]
+    mod replay;
+    #[cfg(feature = "tool")]
     mod report;
     mod roi;
     mod saliency;

@@ -219,6 +219,31 @@ proptest! {
     }
 }
 
+#[test]
+fn of_a_mask_in_parts_the_largest_is_outlined() {
+    // A crumb that comes first in raster order, a ring, and a crumb in its hole.
+    let rows = [
+        "#........", //
+        "...#####.",
+        "...#...#.",
+        "...#.#.#.",
+        "...#...#.",
+        "...#####.",
+        ".........",
+    ];
+    let mask: Vec<u8> = rows.concat().bytes().map(|c| u8::from(c == b'#') * 255).collect();
+    let mut polygon = Vec::new();
+    Contour::default().run(&mask, 9, [0, 0], 0.5, &mut polygon);
+    assert_eq!(polygon, [[3.0, 1.0], [7.0, 1.0], [7.0, 5.0], [3.0, 5.0]]);
+}
+
+#[test]
+fn a_mask_as_thin_as_a_line_still_has_three_corners() {
+    let mut polygon = Vec::new();
+    Contour::default().run(&[255; 12], 12, [0, 0], 1.0, &mut polygon);
+    assert_eq!(polygon.len(), 3);
+}
+
 /// Pixels that a flood through 4-neighbours from outside the image cannot reach.
 fn enclosed_by(wall: &BTreeSet<(i32, i32)>, size: Size) -> BTreeSet<(i32, i32)> {
     let (w, h) = (size.width as i32, size.height as i32);

@@ -11,35 +11,56 @@ const WEST: usize = 4;
 #[derive(Debug, Default)]
 pub struct Contour {
     boundary: Vec<[i32; 2]>,
+    part: Vec<[i32; 2]>,
+    met: Vec<bool>,
     simplify: Simplify,
 }
 
 impl Contour {
-    /// The outer boundary of `mask` (rows of `width` pixels, inside where not 0)
-    /// through the centres of its boundary pixels, clockwise on the screen, in
-    /// coordinates of the mask: border following (Moore; Suzuki and Abe 1985)
-    /// over 8-connected pixels. Of a mask with several parts, the part of the
-    /// first pixel in raster order. Empty for an empty mask.
+    /// The outer boundary of the largest part of `mask` (rows of `width` pixels,
+    /// inside where not 0) through the centres of its boundary pixels, clockwise
+    /// on the screen, in coordinates of the mask: border following (Moore;
+    /// Suzuki and Abe 1985) over 8-connected pixels. The largest part is the one
+    /// whose boundary encloses most. Empty for an empty mask.
     pub fn follow(&mut self, mask: &[u8], width: usize) -> &[[i32; 2]] {
         self.boundary.clear();
-        let Some(first) = mask.iter().position(|&m| m != 0) else {
-            return &self.boundary;
-        };
+        self.met.clear();
+        self.met.resize(mask.len(), false);
+        let mut most = i64::MIN;
+        for start in 0..mask.len() {
+            if mask[start] == 0 || self.met[start] || !is_upper_end(mask, width, start) {
+                continue;
+            }
+            self.follow_from(mask, width, start);
+            // The boundary of a hole runs the other way round and counts negative.
+            let enclosed = doubled_area(&self.part);
+            if enclosed > most {
+                most = enclosed;
+                std::mem::swap(&mut self.boundary, &mut self.part);
+            }
+        }
+        &self.boundary
+    }
+
+    /// The boundary on which the pixel `start` lies whose northern and western
+    /// neighbours are outside, into `part`.
+    fn follow_from(&mut self, mask: &[u8], width: usize, start: usize) {
+        self.part.clear();
         let height = mask.len() / width;
         let inside = |x: usize, y: usize| x < width && y < height && mask[y * width + x] != 0;
-        let start = (first % width, first / width);
+        let start = (start % width, start / width);
         let (mut x, mut y) = start;
-        // Nothing precedes the first pixel in raster order, so its western
-        // neighbour is outside; the search goes clockwise from there.
+        // The western neighbour is outside; the search goes clockwise from there.
         let mut from = WEST;
         let mut first_step = None;
         loop {
+            self.met[y * width + x] = true;
             let found = (0..8).map(|k| (from + k) % 8).find(|&step| {
                 let (dx, dy) = STEPS[step];
                 inside(x.wrapping_add_signed(dx), y.wrapping_add_signed(dy))
             });
             let Some(step) = found else {
-                self.boundary.push([x as i32, y as i32]);
+                self.part.push([x as i32, y as i32]);
                 break;
             };
             // Round when the first step is about to be taken again (Jacob's
@@ -51,13 +72,12 @@ impl Contour {
                     Some(_) => {}
                 }
             }
-            self.boundary.push([x as i32, y as i32]);
+            self.part.push([x as i32, y as i32]);
             x = x.wrapping_add_signed(STEPS[step].0);
             y = y.wrapping_add_signed(STEPS[step].1);
             // Go on from the last neighbour known to be outside.
             from = (step + if step.is_multiple_of(2) { 6 } else { 5 }) % 8;
         }
-        &self.boundary
     }
 
     /// Follows the boundary, simplifies it so that no boundary pixel is farther
@@ -77,4 +97,24 @@ impl Contour {
             out.push([point[0] as f32 + origin[0] as f32, point[1] as f32 + origin[1] as f32]);
         }
     }
+}
+
+/// True where the neighbours to the west and to the north are all outside, as
+/// they are at the first pixel of every part.
+fn is_upper_end(mask: &[u8], width: usize, at: usize) -> bool {
+    let (x, y) = (at % width, at / width);
+    let outside = |x: usize, y: usize| x >= width || mask[y * width + x] == 0;
+    (x == 0 || outside(x - 1, y))
+        && (y == 0
+            || (outside(x, y - 1) && outside(x + 1, y - 1) && (x == 0 || outside(x - 1, y - 1))))
+}
+
+/// Twice the enclosed area (shoelace formula), positive for a polygon that runs
+/// clockwise on the screen.
+fn doubled_area(polygon: &[[i32; 2]]) -> i64 {
+    let next = polygon.iter().cycle().skip(1);
+    let cross = |(a, b): (&[i32; 2], &[i32; 2])| {
+        i64::from(a[0]) * i64::from(b[1]) - i64::from(b[0]) * i64::from(a[1])
+    };
+    polygon.iter().zip(next).map(cross).sum()
 }

@@ -42,6 +42,13 @@ impl Simplify {
                 self.stack.extend([(from, i), (i, to)]);
             }
         }
+        // Two points enclose nothing: a mask as thin as a line keeps a third.
+        if n > 2
+            && self.keep.iter().filter(|keep| **keep).count() == 2
+            && let Some(third) = self.keep.iter_mut().find(|keep| !**keep)
+        {
+            *third = true;
+        }
         &self.keep
     }
 }

@@ -152,8 +152,10 @@ pub fn winners<S: Simd>(
             i += 1;
         }
         place[lane] = i;
-        smaller[lane] = if i > 0 { costs[i - 1][lane] } else { best[lane] };
-        larger[lane] = if i + 1 < n { costs[i + 1][lane] } else { best[lane] };
+        // At an end of the range nothing is known beyond it: no offset then.
+        let both = i > 0 && i + 1 < n;
+        smaller[lane] = if both { costs[i - 1][lane] } else { best[lane] };
+        larger[lane] = if both { costs[i + 1][lane] } else { best[lane] };
     }
     let mut out = Winners { disparity: [NO_MATCH; LANES], evidence: [0; LANES] };
     for lane in 0..LANES {

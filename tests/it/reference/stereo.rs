@@ -325,7 +325,13 @@ fn winner(
     };
     let cost =
         |d: Option<usize>| d.and_then(|d| costs.get(&d)).copied().map_or(f64::from(c0), f64::from);
-    let (a, b) = (cost(best.checked_sub(1)), cost(Some(best + 1)));
+    // Beyond an end of the range nothing is known: no offset there.
+    let inner = range.start < best && best + 1 < range.end;
+    let (a, b) = if inner {
+        (cost(best.checked_sub(1)), cost(Some(best + 1)))
+    } else {
+        (f64::from(c0), f64::from(c0))
+    };
     let rise = a.max(b) - f64::from(c0);
     let offset = if rise > 0.0 { (32.0 * (a - b) / (2.0 * rise)).round() } else { 0.0 };
     Some((32 * best as i16 + offset as i16, evidence))
