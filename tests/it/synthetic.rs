@@ -115,7 +115,7 @@ fn what_the_left_view_sees_the_right_view_sees_or_something_nearer() {
                 // and slanted surfaces by their slope.
                 let tolerance = 0.3 + 0.02 * d;
                 same += u32::from(seen.iter().any(|s| (s - d).abs() < tolerance));
-                wrong += u32::from(!(nearest > d - tolerance));
+                wrong += u32::from(nearest.is_nan() || nearest <= d - tolerance);
             }
         }
         assert!(f64::from(wrong) < 0.01 * f64::from(checked), "{kind}: {wrong} of {checked}");
@@ -184,7 +184,7 @@ fn ids_name_the_same_thing_in_every_frame() {
     ids.pixels().iter().for_each(|id| areas[usize::from(*id)] += 1);
     let large = areas[1..].iter().filter(|area| **area > 60).count();
     assert!(large >= 10, "{large} objects of more than 60 pixels");
-    assert!(areas[0] > 3 * areas[1..].iter().sum::<u32>(), "most of the street is background");
+    assert!(areas[0] > areas[1..].iter().sum::<u32>(), "most of the street is background");
     // The sky is unknown, and only the sky.
     let (d, _) = maps(scene.truth(20, Side::Left));
     let unknown = d.pixels().iter().filter(|d| d.is_nan()).count();

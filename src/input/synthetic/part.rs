@@ -83,7 +83,7 @@ impl Part {
 
     /// The same as ground: it casts no shadow.
     #[must_use]
-    pub fn as_ground(self) -> Self {
+    pub fn without_shadow(self) -> Self {
         Self { casts: false, ..self }
     }
 

@@ -100,11 +100,11 @@ fn ground() -> Vec<Part> {
             material,
             0,
         )
-        .as_ground()
+        .without_shadow()
     };
     let mut parts = vec![
         Part::new(Shape::Ground { reach: 400.0 }, Pose::at(0.0, 0.0, 0.0), Material::Asphalt, 0)
-            .as_ground(),
+            .without_shadow(),
     ];
     for side in [-1.0, 1.0] {
         parts.push(slab((side * KERB, side * (KERB + 0.18)), Material::Kerb));
@@ -165,7 +165,7 @@ fn cars(time: f64) -> Vec<CarPlace> {
 }
 
 fn people() -> Vec<Walker> {
-    let middle = (ZEBRA.0 + ZEBRA.1) / 2.0;
+    let middle = f64::midpoint(ZEBRA.0, ZEBRA.1);
     vec![
         // On the crossing, one from each side.
         Walker {
@@ -252,6 +252,6 @@ fn lighting(driven: f64) -> Lighting {
 }
 
 /// Distance of the house fronts from the middle of the road.
-pub(self) const fn front_line() -> f64 {
+const fn front_line() -> f64 {
     FRONTS
 }

@@ -54,7 +54,9 @@ fn room() -> Vec<Part> {
         slab(&mut parts, [x, WALL - 0.032, -1.2], [x + 0.15, WALL, 0.0], panel, 0.01);
     }
     // Nothing is to be seen behind the wall or below the table.
-    parts.iter_mut().for_each(|part| part.casts = false);
+    for part in &mut parts {
+        part.casts = false;
+    }
     let half = (0.26, 0.19);
     let shape =
         Convex::cuboid(Vec3::new(-half.0, -0.025, -half.1), Vec3::new(half.0, 0.0, half.1), 0.006);

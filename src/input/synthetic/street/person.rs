@@ -60,7 +60,7 @@ pub fn walker(parts: &mut Vec<Part>, object: u16, person: &Walker, time: f64) {
         colour: trouser_colour,
         second: trouser_colour,
         weave: Weave::Plain,
-        seed: style ^ 77,
+        seed: style ^ 0x4D,
     };
     let skin_colour = choose(&SKINS, style, 3);
     let skin = Material::Skin { colour: skin_colour, face: false };

@@ -132,7 +132,7 @@ pub fn wheel(radius: f64, turn: f64, spot: &Spot) -> Finish {
     let p = spot.local;
     let fp = spot.blur;
     let r = (p.x * p.x + p.y * p.y).sqrt() / radius;
-    let tyre = rgb(0x30_30_32) * (0.8 + 0.3 * fold(r * 9.0, 1.0).abs());
+    let tyre = rgb(0x0030_3032) * (0.8 + 0.3 * fold(r * 9.0, 1.0).abs());
     if spot.normal.z.abs() < 0.5 {
         let angle = libm::atan2(p.y, p.x) - turn;
         let tread = stripe(fold(angle * radius, 0.05), 0.008, fp);

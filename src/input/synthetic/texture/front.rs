@@ -104,7 +104,7 @@ impl Front {
         if w.storey == 0 {
             return self.shop(&w, key, u, v, edge, blur);
         }
-        let middle = (w.x.0 + w.x.1) / 2.0;
+        let middle = f64::midpoint(w.x.0, w.x.1);
         let rail = w.z.0 + 0.68 * (w.z.1 - w.z.0);
         let frame = coverage(edge - 0.07, blur).max(stripe(x - middle, 0.035, blur)).max(stripe(
             z - rail,

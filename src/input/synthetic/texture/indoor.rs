@@ -70,7 +70,7 @@ pub fn picture(seed: u32, half: (f64, f64), spot: &Spot) -> Finish {
     let (x, z) = (spot.local.x, spot.local.z);
     let edge = (half.0 - x.abs()).min(half.1 - z.abs());
     let blur = spot.blur;
-    let (u, v) = ((x / half.0 + 1.0) / 2.0, (z / half.1 + 1.0) / 2.0);
+    let (u, v) = (f64::midpoint(x / half.0, 1.0), f64::midpoint(z / half.1, 1.0));
     let painted = landscape(seed, u, v, blur / (2.0 * half.0));
     let mount = blend(rgb(0xE6_E0_D4), painted, coverage(0.05 - edge, blur));
     let grain = fractal2(75, 60.0 * (x + z), 9.0 * (x - z), 3, 60.0 * blur);
@@ -96,9 +96,7 @@ pub fn box_print(
         let u = 0.5 + spot.normal.x.signum() * p.y / size.1;
         let ink =
             text_block(seed ^ 7, (u - 0.12) / 0.76, (v - 0.1) / 0.55, 11.0, blur / (0.55 * size.2));
-        let title = lettering(seed, (v - 0.2) * 7.5, 1.0 - (u - 0.2) / 0.6, 7.5 * blur / size.2);
-        let side = blend(accent, gray(0.015), ink);
-        blend(side, rgb(0xFA_FA_F2), if v > 0.68 { 0.0 * title } else { 0.0 })
+        blend(accent, gray(0.015), ink)
     } else {
         blend(accent, base, coverage((p.x / size.0).abs() - 0.3, blur / size.0))
     };

@@ -21,7 +21,7 @@ pub fn lettering(seed: u32, u: f64, v: f64, footprint: f64) -> f64 {
     // A stem at the left of most letters, bars and dots elsewhere.
     let stem = column == 0 && key & 7 != 0;
     let bar = row % 2 == 0 && key >> (8 + row) & 3 != 0;
-    let dot = key >> (12 + column + 3 * row) & 3 == 0;
+    let dot = (key >> (12 + column + 3 * row)).trailing_zeros() >= 2;
     let solid = if stem || bar || dot { 1.0 } else { 0.0 };
     // Letters finer than a sample turn gray.
     let clear = coverage(footprint - 0.18, 0.12);
@@ -52,7 +52,7 @@ pub fn landscape(seed: u32, u: f64, v: f64, footprint: f64) -> Vec3 {
     ];
     for (k, (height, roughness, tone)) in ridges.into_iter().enumerate() {
         let top = height + 0.13 * fractal2(seed + k as u32, roughness * u, 3.7, 4, 0.0);
-        let brush = 1.0 + 0.5 * fractal2(seed ^ 99, 26.0 * u, 40.0 * v, 2, 40.0 * blur);
+        let brush = 1.0 + 0.5 * fractal2(seed ^ 0x63, 26.0 * u, 40.0 * v, 2, 40.0 * blur);
         colour = blend(colour, tone * brush, coverage(v - top, blur));
     }
     let sun = ((u - 0.72) * (u - 0.72) + (v - 0.8) * (v - 0.8)).sqrt();

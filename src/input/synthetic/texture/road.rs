@@ -61,14 +61,15 @@ pub fn asphalt(spot: &Spot) -> Finish {
 /// Share of the point that is painted.
 fn markings(x: f64, y: f64, footprint: f64, blur: f64) -> f64 {
     let long = 2.0 * blur;
-    let zebra_near = coverage((y - (ZEBRA.0 + ZEBRA.1) / 2.0).abs() - 1.5, long);
+    let zebra_near = coverage((y - f64::midpoint(ZEBRA.0, ZEBRA.1)).abs() - 1.5, long);
     let zebra =
         zebra_near * stripe(fold(x, 1.0), 0.26, footprint) * coverage(x.abs() - 5.2, footprint);
     let stop = |at: f64, low: f64, high: f64| {
-        stripe(y - at, 0.15, long) * stripe(x - (low + high) / 2.0, (high - low) / 2.0, footprint)
+        stripe(y - at, 0.15, long)
+            * stripe(x - f64::midpoint(low, high), (high - low) / 2.0, footprint)
     };
     let stops = stop(ZEBRA.0 - 1.6, 0.2, 3.3).max(stop(ZEBRA.1 + 1.6, -3.3, -0.2));
-    let beside = coverage(2.4 - (y - (ZEBRA.0 + ZEBRA.1) / 2.0).abs(), long);
+    let beside = coverage(2.4 - (y - f64::midpoint(ZEBRA.0, ZEBRA.1)).abs(), long);
     let dash = coverage(fold(y - 1.0, 6.0).abs() - 1.5, long);
     let centre = stripe(x, 0.07, footprint) * dash * beside;
     let edge = stripe(x.abs() - EDGE_LINE, 0.06, footprint) * beside;
