@@ -111,7 +111,7 @@
         el('td', { class: 'n' }, metres(r.distance) + spread),
         meter,
         el('td', { class: 'n opt' }, r.size ? r.size.map(digits).join(' × ') : '–'),
-        el('td', { class: 'n opt' }, known(r.speed) ? digits(r.speed) + ' m/s' : '–'),
+        el('td', { class: 'n opt more' }, known(r.speed) ? digits(r.speed) + ' m/s' : '–'),
         el('td', { class: 'n opt more' }, known(r.near) && known(r.far) ? digits(r.near) + '–' + digits(r.far) : '–'),
         el('td', { class: 'n opt more' }, known(r.saliency) ? r.saliency.toFixed(2) : '–'));
       row.addEventListener('pointerenter', () => light(r.key));
