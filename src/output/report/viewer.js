@@ -194,7 +194,7 @@
   // ---- showing ------------------------------------------------------------------------
   const thumbs = VIEWS.map((v, i) => {
     const box = el('span', { class: 'view' }, el('img', { class: 'base', alt: '' }), el('img', { class: 'layer', alt: '' }), svg('svg', { class: 'marks' }));
-    const node = el('button', { class: 'thumb', role: 'tab', title: 'key ' + (i + 1) }, box, el('span', {}, el('b', {}, v.name), ' · ' + v.note));
+    const node = el('button', { class: 'thumb', role: 'tab', title: 'key ' + (i + 1) }, box, el('span', {}, el('b', {}, v.name), el('i', {}, ' · ' + v.note)));
     box.style.display = 'block';
     node.addEventListener('click', () => choose(i));
     $('thumbs').append(node);
