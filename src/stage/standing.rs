@@ -10,6 +10,12 @@ use crate::stage::regions::union_find::UnionFind;
 /// Heights in metres (of a road scene) between which a segment lies.
 const LOW_M: f32 = 0.2;
 const HIGH_M: f32 = 2.6;
+/// What goes on above [`HIGH_M`] up to this height is part of a building.
+const TALL_M: f32 = 3.4;
+/// Share of its columns from which a thing is such a part, if it is wider than
+/// a trunk or a pole, metres.
+const MOST_TALL: f32 = 0.4;
+const TRUNK_M: f32 = 1.2;
 /// Uncertainty of a cell's disparity in pixels; it lifts the lower limit far away.
 const NOISE_PX: f32 = 0.4;
 /// A segment that begins no higher than this stands on the ground, metres.
@@ -21,6 +27,8 @@ const GAP_M: f32 = 0.5;
 /// Their difference in depth: metres, and in parts of the depth.
 const STEP_M: f32 = 0.5;
 const STEP_PART: f32 = 0.04;
+/// The same of columns side by side, metres: a surface seen at a grazing angle.
+const NEXT_STEP_M: f32 = 0.8;
 /// How far behind its lower part a thing's upper part may begin (a windscreen
 /// behind a bonnet), metres.
 const SETBACK_M: f32 = 1.5;
@@ -51,6 +59,7 @@ pub struct Thing {
     /// Columns of cells, and how many of them stand on the ground.
     columns: u32,
     contacts: u32,
+    tall: u32,
 }
 
 /// Cells of one column that are one surface.
@@ -65,6 +74,8 @@ struct Segment {
     last: f32,
     top_m: f32,
     contact: bool,
+    /// Goes on above what is looked at.
+    tall: bool,
 }
 
 impl Segment {
@@ -142,6 +153,16 @@ impl Standing {
                 let (u, v) = cell_centre(x, y);
                 let height = plane.height(u, v, d);
                 let low = LOW_M * scale + NOISE_PX * plane.camera_height_m / d;
+                if let Some(s) = &mut open
+                    && height > HIGH_M
+                    && agree(d, s.last)
+                {
+                    s.last = d;
+                    s.tall = height > TALL_M;
+                    if !s.tall {
+                        continue;
+                    }
+                }
                 if height < low || height > HIGH_M {
                     self.segments.extend(open.take());
                     // Directly above a cell of the ground, something stands on it.
@@ -171,6 +192,7 @@ impl Standing {
                             last: d,
                             top_m: height,
                             contact: carried || hidden || height <= CONTACT_M * scale,
+                            tall: false,
                         });
                         // It carries one segment only.
                         carried = false;
@@ -226,6 +248,8 @@ impl Standing {
             for j in from..self.first[column] as usize {
                 let t = self.segments[j];
                 let overlap = s.lower.min(t.lower) > s.upper.max(t.upper);
+                let next = t.x + 1 == s.x;
+                let step = if next { step.max(NEXT_STEP_M * scale) } else { step };
                 if overlap && (depth_scale / t.disparity() - z).abs() <= step {
                     self.sets.union(j as u32, i as u32);
                 }
@@ -257,6 +281,7 @@ impl Standing {
             t.cells += s.cells;
             t.columns += 1;
             t.contacts += u32::from(s.contact);
+            t.tall += u32::from(s.tall);
             t.lateral_m[0] = t.lateral_m[0].min(left);
             t.lateral_m[1] = t.lateral_m[1].max(left + CELL as f32 * z / focal);
             t.top_m = t.top_m.max(s.top_m);
@@ -269,8 +294,10 @@ impl Standing {
             let thing = out.list[i];
             let stands = thing.contacts as f32 >= LEAST_CONTACT * thing.columns as f32;
             let large = thing.cells >= least_cells && thing.top_m >= LEAST_TOP_M * scale;
+            let building = thing.tall as f32 > MOST_TALL * thing.columns as f32
+                && thing.lateral_m[1] - thing.lateral_m[0] > TRUNK_M;
             out.floating += u32::from(large && !stands);
-            if large && stands {
+            if large && stands && !building {
                 out.list[kept] = thing;
                 kept += 1;
                 self.seen.push(kept as u32);

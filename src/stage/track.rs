@@ -92,7 +92,8 @@ impl Track {
     ///
     /// A new track is NEW until it was seen in `tracking.confirm` of the last
     /// three frames, then ACTIVE. An active track that is not seen is appended,
-    /// oldest first, as COASTED for up to `tracking.max_age` seconds, at its
+    /// oldest first, as COASTED for up to `tracking.max_age` seconds (no longer
+    /// than it was seen), at its
     /// predicted place: it takes the next free label, which no pixel of the
     /// label image has; its disparity and depth are NaN (not measured) and its
     /// confidence falls to one half over that time. A track that ends without
@@ -194,7 +195,7 @@ impl Track {
     fn coast(&mut self, stamp: Stamp, rig: &StereoRig, regions: &mut RegionList) {
         self.order.clear();
         for (i, track) in self.tracks.iter().enumerate() {
-            if track.alive && !track.seen && track.active {
+            if track.alive && !track.seen && track.active && track.is_predictable(stamp) {
                 self.order.push((track.id, i as u32));
             }
         }

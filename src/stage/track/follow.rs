@@ -155,6 +155,12 @@ impl Follow {
         stamp.seconds_since(self.last_seen)
     }
 
+    /// True while its prediction is worth publishing: a track coasts no longer
+    /// than it was seen.
+    pub fn is_predictable(&self, stamp: Stamp) -> bool {
+        self.unseen_for(stamp) <= self.last_seen.seconds_since(self.born)
+    }
+
     /// True for a track that was never believed and can no longer become so
     /// without starting over: missed in the last two frames.
     pub fn is_hopeless(&self) -> bool {
