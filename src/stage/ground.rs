@@ -40,7 +40,7 @@ const HEIGHTS_M: std::ops::RangeInclusive<f32> = 0.05..=20.0;
 ///
 /// In space it is n · P = f B with n = (b fx, a fy, a cy + b cx + c), because
 /// d = f B / Z and u = fx X / Z + cx, v = fy Y / Z + cy. The height of a point
-/// above it is therefore (f B / |n|) (d − d_plane) / d.
+/// above it is therefore `(f B / |n|) (d − d_plane) / d`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     /// Change of disparity per row.

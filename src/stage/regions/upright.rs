@@ -138,7 +138,7 @@ impl Upright {
                             agree(d, surface)
                         } else {
                             // NaN does not contradict.
-                            !((d - surface).abs() > (SURFACE_PART * surface).max(1.0))
+                            d.is_nan() || (d - surface).abs() <= (SURFACE_PART * surface).max(1.0)
                         };
                         if inside {
                             *out = id;

@@ -108,13 +108,12 @@ impl Barrier {
 }
 
 /// The path to a cell of value `value`, if better over one of two neighbours.
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "the innermost loop of the scan")]
+#[inline]
 fn relax(value: [u8; CHANNELS], mut path: Path, first: &Path, second: &Path) -> Path {
     for neighbour in [first, second] {
-        for c in 0..CHANNELS {
-            let high = neighbour.high[c].max(value[c]);
-            let low = neighbour.low[c].min(value[c]);
+        for (c, &value) in value.iter().enumerate() {
+            let high = neighbour.high[c].max(value);
+            let low = neighbour.low[c].min(value);
             let better = high - low < path.barrier[c];
             path.barrier[c] = if better { high - low } else { path.barrier[c] };
             path.high[c] = if better { high } else { path.high[c] };
