@@ -29,6 +29,7 @@ impl Size {
 
     /// The size after division by `factor`, rounded up, so that every pixel of
     /// `self` has a cell: pixel `(x, y)` belongs to cell `(x / factor, y / factor)`.
+    #[must_use]
     pub const fn divided_by(self, factor: usize) -> Self {
         Self { width: self.width.div_ceil(factor), height: self.height.div_ceil(factor) }
     }

@@ -74,7 +74,7 @@ pub struct Perception {
     pub saliency: Image<f32>,
     /// Region of interest.
     pub roi: RoiMask,
-    /// Disparity d = x_l - x_r - (cx_l - cx_r) in pixels, in steps of
+    /// Disparity `d = x_l - x_r - (cx_l - cx_r)` in pixels, in steps of
     /// [`DISPARITY_STEP`]; NaN where there is none.
     pub disparity: Image<f32>,
     /// Probability that the disparity is right, 0..=1; 0 where there is none.

@@ -40,7 +40,7 @@ pub struct BenchArgs {
     /// Match a centred rectangle of this share of the image, with its border, instead of what is salient
     #[arg(long, value_name = "FRACTION")]
     roi: Option<f32>,
-    /// Number of disparities searched (stereo.disparity_range)
+    /// Number of disparities searched (`stereo.disparity_range`)
     #[arg(long, value_name = "N")]
     disparities: Option<i64>,
     /// Frames measured

@@ -44,7 +44,7 @@ pub struct ExportBagArgs {
     /// Baseline of the pair in metres
     #[arg(long, value_name = "M", requires = "focal")]
     baseline: Option<f64>,
-    /// cx_right - cx_left of the pair in pixels
+    /// `cx_right - cx_left` of the pair in pixels
     #[arg(long, value_name = "PX", requires = "focal", allow_hyphen_values = true)]
     offset: Option<f64>,
     /// Output bag: a single file when it ends in .mcap, else a bag folder

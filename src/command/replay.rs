@@ -47,7 +47,7 @@ pub struct ReplayArgs {
 /// Topics other than the ones that are found by themselves.
 #[derive(Clone, Debug, Default, Args)]
 pub struct TopicArgs {
-    /// Topic of the left image (found by itself when it ends in left/image_rect or the like)
+    /// Topic of the left image (found by itself when it ends in `left/image_rect` or the like)
     #[arg(long, value_name = "TOPIC")]
     left_image: Option<String>,
     /// Topic of the right image

@@ -97,7 +97,7 @@ fn what_stands_is_found_and_what_floats_is_counted() {
     Standing::default().run(&disparity, &plane, &rig, 4, &mut things);
 
     let at = |[left, right, bottom, top, distance]: [f64; 5]| {
-        let (x, h) = ((left + right) / 2.0, (bottom + top) / 2.0);
+        let (x, h) = (left.midpoint(right), bottom.midpoint(top));
         let u = 320.0 + F * x / distance;
         let v = HORIZON + F * (HEIGHT - h) / distance;
         things.ids.get(u as usize / 4, v as usize / 4)

@@ -41,7 +41,7 @@ fn pair(size: Size, seed: u64) -> (Image<u8>, Image<u8>) {
 fn coarse_of(size: Size, seed: u64) -> Image<f32> {
     let mut noise = Noise(seed);
     Image::from_fn(size.divided_by(CELL), |_, _| {
-        if noise.next() % 4 == 0 { f32::NAN } else { (noise.next() % 14) as f32 }
+        if noise.next().is_multiple_of(4) { f32::NAN } else { (noise.next() % 14) as f32 }
     })
 }
 
@@ -108,10 +108,12 @@ fn ranges_beyond_a_byte_equal_the_reference() {
 
 #[test]
 fn degenerate_regions_equal_the_reference() {
+    type Inside = fn(usize, usize) -> bool;
+
     let size = Size::new(131, 77);
     let (left, right) = pair(size, 8);
     let coarse = coarse_of(size, 4);
-    let regions: [(&str, fn(usize, usize) -> bool); 6] = [
+    let regions: [(&str, Inside); 6] = [
         ("empty", |_, _| false),
         ("one pixel", |x, y| (x, y) == (60, 40)),
         ("last pixel", |x, y| (x, y) == (130, 76)),
@@ -159,7 +161,7 @@ proptest! {
         let (left, right) = pair(size, seed);
         let coarse = coarse_of(size, seed ^ 1);
         let mut noise = Noise(seed ^ 2);
-        let mask = Image::from_fn(size, |_, _| if noise.next() % rarity == 0 { 255 } else { 0 });
+        let mask = Image::from_fn(size, |_, _| if noise.next().is_multiple_of(rarity) { 255 } else { 0 });
         let settings = Settings {
             penalties: Penalties { p1, p2: p1.saturating_add(more).min(100) },
             context,
@@ -232,7 +234,8 @@ fn random_matches(size: Size, seed: u64) -> Matches {
         })
     };
     let (left, right) = (image(), image());
-    let evidence = Image::from_fn(size, |_, _| if noise.next() % 8 == 0 { 0 } else { 128 });
+    let evidence =
+        Image::from_fn(size, |_, _| if noise.next().is_multiple_of(8) { 0 } else { 128 });
     Matches { left, right, evidence }
 }
 

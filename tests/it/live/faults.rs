@@ -17,6 +17,8 @@ use super::{PATIENCE, environment, names, pair, small, wait};
 
 #[test]
 fn bad_messages_are_counted_by_reason_and_the_node_goes_on() {
+    type Spoil = fn(&mut StereoMessages);
+
     // The one test that looks at /rosout: the log of a process has one node.
     log::init(&LogArgs { stdout: false, ..LogArgs::default() }, "robot.eye");
     let environment = environment(2);
@@ -37,7 +39,7 @@ fn bad_messages_are_counted_by_reason_and_the_node_goes_on() {
         spoil(&mut messages);
         player.publish(messages);
     };
-    let faults: [(&str, fn(&mut StereoMessages)); 7] = [
+    let faults: [(&str, Spoil); 7] = [
         ("payload is 100 bytes", |m| left(m).data.truncate(100)),
         ("unknown image encoding 'rgb7'", |m| left(m).encoding = "rgb7".into()),
         ("step is 10 bytes", |m| left(m).step = 10),

@@ -257,13 +257,12 @@ pub fn matches(views: &Views<'_>, plan: &Plan, settings: &Settings) -> Matches {
                     let p = (x as isize, y as isize);
                     let (costs, floors) = &sums[&p];
                     let range = domain.range(p.0);
-                    if views.mask.is_none_or(|mask| mask.get(x, y) != 0) {
-                        if let Some((d, evidence)) =
+                    if views.mask.is_none_or(|mask| mask.get(x, y) != 0)
+                        && let Some((d, evidence)) =
                             winner(costs, &range, u32::from(*floors), settings.uniqueness_ratio)
-                        {
-                            out.left.set(x, y, d);
-                            out.evidence.set(x, y, evidence);
-                        }
+                    {
+                        out.left.set(x, y, d);
+                        out.evidence.set(x, y, evidence);
                     }
                 }
                 // Tile by tile, and in a tile by growing disparity, as ties go
