@@ -107,7 +107,11 @@ impl BagSource {
             ));
         }
         if reader.message_count() == 0 {
-            return Err(BagError::Empty { path: path.to_owned() });
+            let note = match notes.as_slice() {
+                [] => String::new(),
+                notes => format!(": {}", notes.join("; ")),
+            };
+            return Err(BagError::Empty { path: path.to_owned(), note });
         }
         let topics = reader.topics();
         let selection = Finder { path, topics: &topics, config }.choose(&options.topics)?;

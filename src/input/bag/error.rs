@@ -72,10 +72,12 @@ pub enum BagError {
         named: String,
     },
     /// No message at all.
-    #[error("the bag {path} holds no message")]
+    #[error("the bag {path} holds no message{note}")]
     Empty {
         /// File or folder.
         path: PathBuf,
+        /// What else was noticed about it.
+        note: String,
     },
     /// Nothing to pair.
     #[error("the bag {path} has no stereo images: {wanted}; its topics are {topics}{hint}")]

@@ -195,6 +195,9 @@ fn other_files_are_named() {
         let text = failure(&path, &Config::default());
         assert!(text.contains(wanted), "{text}");
     }
+    fs::write(&path, b"\x89MCAP0\r\n\x01\xff").unwrap();
+    let text = failure(&path, &Config::default());
+    assert!(text.contains("holds no message") && text.contains("no index"), "{text}");
     let text = failure(&folder.path().join("none.mcap"), &Config::default());
     assert!(text.contains("none.mcap"), "{text}");
     fs::write(folder.path().join("a.db3"), b"SQLite format 3\0").unwrap();
