@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::command::settings::Settings;
+use crate::command::settings::{Settings, bag_options};
 use crate::command::summary;
 use crate::command::watch::write_json;
 use crate::command::{CommandError, Outcome};
 use crate::config::Config;
 use crate::drive::{Engine, worker_pool};
-use crate::input::bag::{BagOptions, BagSource};
+use crate::input::bag::{BagSource, BagTopics};
 use crate::input::dataset::PairFiles;
 use crate::input::synthetic::{SceneKind, SceneOptions, SyntheticScene, SyntheticSource};
 use crate::input::{FrameSource, Observation};
@@ -124,7 +124,7 @@ fn frames(args: &BenchArgs, config: &Config) -> Result<Vec<Observation>, Command
     let wanted = (args.frames as usize).min(MOST_FRAMES_HELD);
     match (&args.bag, &args.left, &args.right) {
         (Some(bag), _, _) => {
-            let source = BagSource::open(bag, config, BagOptions::default())
+            let source = BagSource::open(bag, config, bag_options(config, BagTopics::default())?)
                 .map_err(CommandError::failed)?;
             take(source, wanted)
         }

@@ -6,13 +6,13 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::command::settings::Settings;
+use crate::command::settings::{Settings, bag_options};
 use crate::command::summary;
 use crate::command::watch::{make_parent, progress_bar, stop_on_signal, write_json};
 use crate::command::{CommandError, Outcome};
 use crate::config::Config;
 use crate::drive::{Ending, Engine, drive};
-use crate::input::bag::{BagOptions, BagSource, BagTopics};
+use crate::input::bag::{BagSource, BagTopics};
 use crate::input::{FrameSource, Tally};
 use crate::metric::StageStats;
 use crate::output::AnySink;
@@ -131,7 +131,7 @@ impl RunTotals {
 /// Unusable parameters, a bag without a usable pair, or an output that cannot be written.
 pub fn run(args: &ReplayArgs) -> Result<Outcome, CommandError> {
     let config = args.settings.config(Config::default())?;
-    let options = BagOptions { topics: args.topics.topics(), ..BagOptions::default() };
+    let options = bag_options(&config, args.topics.topics())?;
     let mut source =
         BagSource::open(&args.input, &config, options).map_err(CommandError::failed)?;
     for note in source.notes() {

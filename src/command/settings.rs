@@ -7,6 +7,8 @@ use serde_json::Value;
 
 use crate::command::CommandError;
 use crate::config::Config;
+use crate::input::bag::{BagOptions, BagTopics};
+use crate::ros::calibration::camera_info_from_url;
 use crate::ros::params::{config_from_file, config_from_set};
 
 /// Parameters from a file and from the command line.
@@ -41,6 +43,21 @@ impl Settings {
         }
         Ok(config)
     }
+}
+
+/// What to read of a bag: its topics, and the calibration files that replace
+/// its camera infos (`camera_info.left_url`, `camera_info.right_url`).
+///
+/// # Errors
+/// A calibration file that cannot be read.
+pub fn bag_options(config: &Config, topics: BagTopics) -> Result<BagOptions, CommandError> {
+    let info = |url: &str| match url {
+        "" => Ok(None),
+        url => camera_info_from_url(url).map(Some).map_err(usage),
+    };
+    let urls = &config.camera_info;
+    let camera_infos = [info(&urls.left_url)?, info(&urls.right_url)?];
+    Ok(BagOptions { topics, camera_infos, ..BagOptions::default() })
 }
 
 fn usage(error: impl std::fmt::Display) -> CommandError {

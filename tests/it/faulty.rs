@@ -167,6 +167,25 @@ fn missing_camera_infos_are_named() {
 }
 
 #[test]
+fn a_calibration_file_stands_in_for_a_missing_camera_info() {
+    let folder = tempfile::tempdir().unwrap();
+    let input = bag(&folder, |_, instant| instant.right_info = None);
+    let file = folder.path().join("right.yaml");
+    let text = "image_width: 96\nimage_height: 64\ncamera_name: right\n\
+        camera_matrix: {rows: 3, cols: 3, data: [80, 0, 48, 0, 80, 32, 0, 0, 1]}\n\
+        distortion_model: plumb_bob\n\
+        distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n\
+        rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n\
+        projection_matrix: {rows: 3, cols: 4, data: [80, 0, 48, -8, 0, 80, 32, 0, 0, 0, 1, 0]}\n";
+    std::fs::write(&file, text).unwrap();
+    let set = format!("camera_info.right_url=file://{}", file.display());
+    let run = replay(&input, &["--set", &set]);
+    assert_eq!(run.json["pairs"], PAIRS, "{}", run.errors);
+    let missing = format!("camera_info.right_url=file://{}.gone", file.display());
+    replay(&input, &["--set", &missing]).fails_with(2, &["right.yaml.gone"]);
+}
+
+#[test]
 fn an_uncalibrated_camera_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let input = bag(&folder, |_, instant| {
