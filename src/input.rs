@@ -13,10 +13,16 @@ use crate::perception::StereoFrame;
 /// What is known to be true about a frame, where a source knows it.
 #[derive(Clone, Debug, Default)]
 pub struct Truth {
-    /// True disparity `x_l - x_r - (cx_l - cx_r)` of the left view in pixels; NaN unknown.
+    /// True disparity `x_l - x_r - (cx_l - cx_r)` of the left view in pixels,
+    /// where the source can tell only of pixels that both cameras see; NaN unknown.
     pub disparity: Option<Image<f32>>,
+    /// The same with the pixels that only the left camera sees, from sources
+    /// that know both.
+    pub disparity_with_occluded: Option<Image<f32>>,
     /// Ids of the salient objects in the left view; 0 is background.
     pub objects: Option<Image<u16>>,
+    /// Motion of every left pixel to the next frame `[dx, dy]` in pixels; NaN unknown.
+    pub flow: Option<Image<[f32; 2]>>,
 }
 
 /// One frame and, from some sources, its truth.

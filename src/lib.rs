@@ -16,6 +16,7 @@
 //! | `output` | doors out: live topics, bags, the HTML report |
 //! | `ros` | messages, conversions, parameters, the node |
 //! | `metric` | what the field measures, and stage times over many frames |
+//! | `evaluation` | measured tables: methods on data with truth |
 //! | `drive`, `command` | sources paired with sinks, and the command line |
 //!
 //! Without the default feature `tool` only the core remains, which knows no
@@ -28,6 +29,8 @@ pub mod config;
 #[cfg(feature = "tool")]
 pub mod drive;
 pub mod error;
+#[cfg(feature = "tool")]
+pub mod evaluation;
 pub mod image;
 #[cfg(feature = "tool")]
 pub mod input;

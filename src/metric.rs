@@ -17,17 +17,27 @@
 
 mod disparity;
 mod identity;
+mod map;
+mod mean;
 mod overlap;
 mod pixels;
+mod profile;
 mod sample;
+mod sparsification;
 mod times;
+mod video;
 
 pub use disparity::{DisparityScore, DisparityStats};
 pub use identity::IdSwitches;
+pub use map::{MapScore, MapStats};
+pub use mean::Mean;
 pub use overlap::{Matching, Overlap, RegionCounts, RegionScore};
 pub use pixels::{Confusion, PixelScore};
+pub use profile::{ErrorProfile, PROFILE_STEP};
 pub use sample::EvenSample;
+pub use sparsification::{SPARSIFICATION_STEPS, SparsificationScore, SparsificationStats};
 pub use times::{Percentiles, StageStats, StageSummary};
+pub use video::{VideoScore, VideoStats};
 
 /// `part / whole`, `None` when there is no whole.
 fn share(part: u64, whole: u64) -> Option<f64> {

@@ -187,7 +187,7 @@ impl DatasetSource {
                 for d in disparity.pixels_mut() {
                     *d -= offset;
                 }
-                Some(Truth { disparity: Some(disparity), objects: None })
+                Some(Truth { disparity: Some(disparity), ..Truth::default() })
             }
         };
         let stamp = stamp(number, files.number);

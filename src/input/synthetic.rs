@@ -262,7 +262,7 @@ impl SyntheticScene {
             let z = depth.get(x, y);
             if z.is_finite() { (scale / z) as f32 } else { f32::NAN }
         });
-        Truth { disparity: Some(disparity), objects: Some(geometry.objects) }
+        Truth { disparity: Some(disparity), objects: Some(geometry.objects), ..Truth::default() }
     }
 
     /// Disparity and objects as seen from one side. For [`Side::Right`] the

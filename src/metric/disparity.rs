@@ -1,11 +1,11 @@
 //! Errors of disparity against truth (eq. 10 and the benchmarks' measures).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::share;
 
 /// Collects disparity errors pixel by pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DisparityStats {
     /// Pixels with known truth.
     known: u64,

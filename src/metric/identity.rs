@@ -2,13 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 /// Counts identity switches (CLEAR MOT, Bernardin and Stiefelhagen 2008): a
 /// true object that was matched to one track is matched to another one. A gap
 /// in between does not excuse the switch.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IdSwitches {
     track_of: BTreeMap<u16, u32>,
     switches: u64,
+    /// Objects of scenes that are over.
+    past_objects: usize,
 }
 
 impl IdSwitches {
@@ -21,13 +25,19 @@ impl IdSwitches {
         }
     }
 
+    /// Adds the counts of another scene, whose objects are others.
+    pub fn merge(&mut self, other: &Self) {
+        self.switches += other.switches;
+        self.past_objects += other.objects();
+    }
+
     /// Switches so far; `None` when no object was ever matched to a track.
     pub fn total(&self) -> Option<u64> {
-        (!self.track_of.is_empty()).then_some(self.switches)
+        (self.objects() > 0).then_some(self.switches)
     }
 
     /// True objects that were ever matched to a track.
     pub fn objects(&self) -> usize {
-        self.track_of.len()
+        self.track_of.len() + self.past_objects
     }
 }

@@ -1,6 +1,6 @@
 //! Regions against true objects: overlaps, one-to-one matching, counts.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::share;
 
@@ -100,7 +100,7 @@ pub struct Matching {
 }
 
 /// Collects matchings over frames.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RegionCounts {
     frames: u64,
     true_positives: u64,
@@ -128,6 +128,14 @@ impl RegionCounts {
         }
         self.false_positives += regions.iter().filter(|counts| **counts).count() as u64;
         self.false_negatives += objects.iter().filter(|counts| **counts).count() as u64;
+    }
+
+    /// Adds the counts of another accumulator.
+    pub fn merge(&mut self, other: &Self) {
+        self.frames += other.frames;
+        self.true_positives += other.true_positives;
+        self.false_positives += other.false_positives;
+        self.false_negatives += other.false_negatives;
     }
 
     /// Everything in one row, for matchings at `iou`. `None` when there was

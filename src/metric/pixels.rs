@@ -1,11 +1,11 @@
 //! Pixel-wise classification (eq. 7-9).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::share;
 
 /// Counts of pixels by what they are and what they were taken for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Confusion {
     /// Salient, and found.
     pub true_positives: u64,

@@ -71,7 +71,7 @@ impl SceneMessages {
     /// When an image cannot be encoded.
     pub fn render(scene: &SyntheticScene, index: usize) -> Result<Self, SceneWriteError> {
         let Observation { frame, truth } = scene.observation(index);
-        let Truth { disparity, objects } = truth.unwrap_or_default();
+        let Truth { disparity, objects, .. } = truth.unwrap_or_default();
         let header = |frame_id: &str| Header {
             stamp: Time { sec: frame.stamp.sec(), nanosec: frame.stamp.nanosec() },
             frame_id: frame_id.to_owned(),

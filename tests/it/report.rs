@@ -122,7 +122,8 @@ fn scene(size: Size, index: u32, frame_id: &str) -> (Observation, Perception) {
         right: Picture::Rgb(rgb),
         rig,
     };
-    let truth = Truth { disparity: Some(true_disparity), objects: Some(objects) };
+    let truth =
+        Truth { disparity: Some(true_disparity), objects: Some(objects), ..Truth::default() };
     (Observation { frame, truth: Some(truth) }, out)
 }
 
@@ -332,6 +333,7 @@ fn truth_of_a_larger_picture_is_laid_over_smaller_views() {
     observation.truth = Some(Truth {
         disparity: Some(Image::from_fn(large, |x, y| small.get(at(x, 79), at(y, 29)) * 2.0)),
         objects: Some(Image::from_fn(large, |x, y| ids.get(at(x, 79), at(y, 29)))),
+        ..Truth::default()
     });
     let mut sink = ScoreSink::new(1);
     let score = sink.score(&observation, &perception).unwrap();
@@ -340,7 +342,7 @@ fn truth_of_a_larger_picture_is_laid_over_smaller_views() {
 
     // Truth of quite another size is counted and not scored.
     observation.truth =
-        Some(Truth { disparity: Some(Image::new(Size::new(50, 50))), objects: None });
+        Some(Truth { disparity: Some(Image::new(Size::new(50, 50))), ..Truth::default() });
     assert_eq!(sink.score(&observation, &perception), None);
     assert_eq!(sink.summary().unwrap().unscorable_frames, 1);
 }

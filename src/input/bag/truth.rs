@@ -69,16 +69,19 @@ impl TruthQueue {
             disparity
                 .map(|data| disparity_of(&data, size).map_err(|e| format!("true disparity: {e}")))
                 .transpose()
-                .map(|image| image.map(|image| Truth { disparity: Some(image), objects: None })),
+                .map(|image| {
+                    image.map(|image| Truth { disparity: Some(image), ..Truth::default() })
+                }),
         );
         let objects = self.objects.as_mut().and_then(|queue| queue.take(stamp));
         let objects = note(
             objects
                 .map(|data| objects_of(&data, size).map_err(|e| format!("true objects: {e}")))
                 .transpose()
-                .map(|image| image.map(|image| Truth { disparity: None, objects: Some(image) })),
+                .map(|image| image.map(|image| Truth { objects: Some(image), ..Truth::default() })),
         );
-        let truth = Truth { disparity: disparity.disparity, objects: objects.objects };
+        let truth =
+            Truth { disparity: disparity.disparity, objects: objects.objects, ..Truth::default() };
         let any = truth.disparity.is_some() || truth.objects.is_some();
         (any.then_some(truth), fault)
     }
