@@ -1,15 +1,15 @@
 //! `export-bag`: a scene of a data set, or a pair of images, as a ROS 2 bag.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use crate::command::replay::losses;
 use crate::command::watch::{progress_bar, stop_on_signal};
 use crate::command::{CommandError, Outcome};
 use crate::input::FrameSource;
-use crate::input::dataset::{DatasetSource, Kitti, KittiTruth, KittiYear, PairFiles};
+use crate::input::dataset::{self, DatasetKind, DatasetSource, Opened, PairFiles};
 use crate::output::bag::export_bag;
 
 /// Steps of the progress bar.
@@ -18,15 +18,15 @@ const STEPS: u64 = 1000;
 /// Arguments of `export-bag`.
 #[derive(Debug, Args)]
 pub struct ExportBagArgs {
-    /// Kind of the data set, in its published layout
-    #[arg(long, value_enum, required_unless_present = "left", requires = "path")]
-    dataset: Option<Dataset>,
+    /// Kind of the data set, in its published layout: kitti2012, kitti2015, middlebury, sintel or spring
+    #[arg(long, value_name = "KIND", required_unless_present = "left", requires = "path")]
+    dataset: Option<DatasetKind>,
     /// Folder of the data set
     path: Option<PathBuf>,
-    /// Name of one scene (default: all scenes, one after the other)
-    #[arg(long, value_name = "NAME")]
-    scene: Option<String>,
-    /// Colour images instead of gray ones
+    /// Name of a scene, may be repeated (default: all scenes, one after the other)
+    #[arg(long, value_name = "NAME", requires = "dataset")]
+    scene: Vec<String>,
+    /// Colour images instead of the gray ones of KITTI 2012
     #[arg(long)]
     color: bool,
     /// Truth of occluded pixels too
@@ -52,19 +52,13 @@ pub struct ExportBagArgs {
     output: PathBuf,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Dataset {
-    Kitti2012,
-    Kitti2015,
-}
-
 /// Runs the command.
 ///
 /// # Errors
 /// A layout with missing files, images that cannot be read, or a bag that
 /// cannot be written.
 pub fn run(args: &ExportBagArgs) -> Result<Outcome, CommandError> {
-    let mut source = source(args)?;
+    let (mut source, left_out) = source(args)?;
     let stop = stop_on_signal()?;
     let bar = progress_bar(STEPS);
     let exported = export_bag(&mut source, &args.output, |source| {
@@ -83,19 +77,16 @@ pub fn run(args: &ExportBagArgs) -> Result<Outcome, CommandError> {
     for line in losses(tally) {
         eprintln!("{line}");
     }
-    Ok(if tally.has_losses() { Outcome::DoneWithLosses } else { Outcome::Done })
+    let losses = tally.has_losses() || left_out > 0;
+    Ok(if losses { Outcome::DoneWithLosses } else { Outcome::Done })
 }
 
-fn source(args: &ExportBagArgs) -> Result<DatasetSource, CommandError> {
-    let opened = match (args.dataset, &args.path, &args.left, &args.right) {
-        (Some(dataset), Some(path), _, _) => {
-            let year = match dataset {
-                Dataset::Kitti2012 => KittiYear::Y2012,
-                Dataset::Kitti2015 => KittiYear::Y2015,
-            };
-            let truth = if args.occluded { KittiTruth::All } else { KittiTruth::NonOccluded };
-            Kitti { scene: args.scene.clone(), color: args.color, truth, ..Kitti::new(path, year) }
-                .open()
+/// The frames, and how many scenes are left out of them.
+fn source(args: &ExportBagArgs) -> Result<(DatasetSource, usize), CommandError> {
+    match (args.dataset, &args.path, &args.left, &args.right) {
+        (Some(kind), Some(path), _, _) => {
+            let opened = scenes(args, kind, path)?;
+            Ok((DatasetSource::new(opened.scenes), opened.skipped.len()))
         }
         (_, _, Some(left), Some(right)) => PairFiles {
             left: left.clone(),
@@ -105,12 +96,36 @@ fn source(args: &ExportBagArgs) -> Result<DatasetSource, CommandError> {
             right_offset_px: args.offset,
             ..PairFiles::default()
         }
-        .open(),
-        _ => {
-            return Err(CommandError::Usage(
-                "name a data set (--dataset KIND PATH) or a pair (--left FILE --right FILE)".into(),
-            ));
-        }
+        .open()
+        .map(|source| (source, 0))
+        .map_err(CommandError::failed),
+        _ => Err(CommandError::Usage(
+            "name a data set (--dataset KIND PATH) or a pair (--left FILE --right FILE)".into(),
+        )),
+    }
+}
+
+fn scenes(args: &ExportBagArgs, kind: DatasetKind, path: &Path) -> Result<Opened, CommandError> {
+    let opened = match kind {
+        DatasetKind::Kitti2012 if args.color => dataset::open_kitti2012_in_color(path, &args.scene),
+        _ => dataset::open(kind, path, &args.scene),
     };
-    opened.map_err(CommandError::failed)
+    let mut opened = opened.map_err(CommandError::failed)?;
+    for (name, reason) in &opened.skipped {
+        eprintln!("scene {name} is left out: {reason}");
+    }
+    opened.scenes.retain(|scene| !scene.monocular);
+    if opened.scenes.is_empty() {
+        return Err(CommandError::Usage(format!(
+            "{kind} at {} has no stereo pairs",
+            path.display()
+        )));
+    }
+    if args.occluded {
+        let frames = opened.scenes.iter_mut().flat_map(|scene| &mut scene.frames);
+        for truth in frames.map(|frame| &mut frame.truth) {
+            truth.disparity = truth.disparity_with_occluded.take().or(truth.disparity.take());
+        }
+    }
+    Ok(opened)
 }

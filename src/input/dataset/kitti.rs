@@ -1,197 +1,197 @@
-//! KITTI Stereo 2012 (Geiger et al. 2012) and 2015 (Menze and Geiger 2015) in
-//! their published layouts.
+//! KITTI Stereo and Flow 2012 (Geiger et al. 2012) and 2015 (Menze and Geiger
+//! 2015) in their published layouts, below `training`, `testing` or the path itself.
 //!
 //! | | 2012 | 2015 |
 //! |---|---|---|
 //! | left, right | `image_0`, `image_1` (gray), `colored_0`, `colored_1` | `image_2`, `image_3` |
 //! | calibration | `calib/NNNNNN.txt`: `P0:` … `P3:` | `calib_cam_to_cam/NNNNNN.txt`: `P_rect_02:`, `P_rect_03:` |
-//! | truth | `disp_noc`, `disp_occ` | `disp_noc_0`, `disp_occ_0` |
+//! | disparity | `disp_noc`, `disp_occ` | `disp_noc_0`, `disp_occ_0` |
+//! | motion | `flow_occ`, `flow_noc` | `flow_occ`, `flow_noc` |
+//! | objects | | `obj_map` |
 //!
 //! A scene `NNNNNN` has the frames `NNNNNN_FF.png`; `_10` is the one with
-//! truth, the multi-view extension has 21 of them.
+//! truth, the multi-view extension has 21 of them at 10 Hz.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{Calibration, DatasetError, DatasetSource, FrameFiles, Scene};
+use super::{
+    Calibration, DatasetError, DisparityCoding, DisparityFile, FlowCoding, FlowFile, FrameFiles,
+    Layout, ObjectCoding, ObjectFile, Scene, TruthFiles,
+};
 
 /// Frame number that has truth.
 const TRUTH_FRAME: u32 = 10;
-
-/// Which of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum KittiYear {
-    /// Static scenes.
-    Y2012,
-    /// Dynamic scenes, in colour.
-    Y2015,
-}
-
-/// Which pixels have truth.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum KittiTruth {
-    /// Those that both cameras see (`disp_noc`).
-    #[default]
-    NonOccluded,
-    /// All that the laser measured (`disp_occ`).
-    All,
-}
-
-/// What to read.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kitti {
-    /// Folder that holds `training` (or `testing`), or that one itself.
-    pub path: PathBuf,
-    /// Which of the two data sets.
-    pub year: KittiYear,
-    /// The one scene to read, as `000027` or `27`; `None`: all.
-    pub scene: Option<String>,
-    /// Colour images of 2012 instead of the gray ones.
-    pub color: bool,
-    /// Which truth to take when both are there.
-    pub truth: KittiTruth,
-}
+const FRAME_RATE_HZ: f64 = 10.0;
 
 /// Names of the folders of one year and camera pair.
-struct Layout {
+struct Folders {
     left: &'static str,
     right: &'static str,
     calibration: &'static str,
     /// Projection matrices of left and right camera.
     matrices: [&'static str; 2],
-    truth: [&'static str; 2],
+    non_occluded: &'static str,
+    all: &'static str,
 }
 
-const GRAY_2012: Layout = Layout {
+const GRAY_2012: Folders = Folders {
     left: "image_0",
     right: "image_1",
     calibration: "calib",
     matrices: ["P0", "P1"],
-    truth: ["disp_noc", "disp_occ"],
+    non_occluded: "disp_noc",
+    all: "disp_occ",
 };
 
-const COLOR_2012: Layout = Layout {
-    left: "colored_0",
-    right: "colored_1",
-    calibration: "calib",
-    matrices: ["P2", "P3"],
-    truth: ["disp_noc", "disp_occ"],
-};
+const COLOR_2012: Folders =
+    Folders { left: "colored_0", right: "colored_1", matrices: ["P2", "P3"], ..GRAY_2012 };
 
-const COLOR_2015: Layout = Layout {
+const COLOR_2015: Folders = Folders {
     left: "image_2",
     right: "image_3",
     calibration: "calib_cam_to_cam",
     matrices: ["P_rect_02", "P_rect_03"],
-    truth: ["disp_noc_0", "disp_occ_0"],
+    non_occluded: "disp_noc_0",
+    all: "disp_occ_0",
 };
 
+/// Scenes of one of the two.
+pub struct Kitti {
+    root: PathBuf,
+    folders: &'static Folders,
+    names: Vec<String>,
+    /// Frame numbers of each scene.
+    numbers: Vec<Vec<u32>>,
+}
+
 impl Kitti {
-    /// All scenes of a data set, gray images, non-occluded truth.
-    pub fn new(path: &Path, year: KittiYear) -> Self {
-        let path = path.to_owned();
-        Self { path, year, scene: None, color: false, truth: KittiTruth::default() }
-    }
-
-    /// Checks that all files are there and reads the calibrations.
-    ///
-    /// # Errors
-    /// When a file of the published layout is missing or a calibration unusable;
-    /// the text names the file.
-    pub fn open(&self) -> Result<DatasetSource, DatasetError> {
-        let root = self.root()?;
-        let layout = self.layout(&root);
-        let scenes = self.wanted(list(&root.join(layout.left))?, &root.join(layout.left))?;
-        let scenes: Result<Vec<Scene>, DatasetError> = scenes
-            .into_iter()
-            .map(|(name, frames)| self.scene(&root, layout, name, frames))
-            .collect();
-        Ok(DatasetSource::new(scenes?))
-    }
-
-    /// `training`, `testing`, or the path itself.
-    fn root(&self) -> Result<PathBuf, DatasetError> {
-        let candidates = [self.path.clone(), self.path.join("training"), self.path.join("testing")];
-        let has_images = |root: &&PathBuf| {
-            [GRAY_2012.left, COLOR_2012.left, COLOR_2015.left]
-                .iter()
-                .any(|folder| root.join(folder).is_dir())
-        };
-        match candidates.iter().find(has_images) {
-            Some(root) => Ok(root.clone()),
-            None => Err(DatasetError::Missing {
-                path: self.path.join("training").join(self.layout(&self.path).left),
-                needed: "the left images of KITTI's published layout".to_owned(),
-            }),
+    /// The scenes of 2012, the gray images where they are there.
+    pub fn find_2012(path: &Path) -> Result<Self, DatasetError> {
+        match root(path, &GRAY_2012) {
+            Ok(root) => Self::list(root, &GRAY_2012),
+            // Without colour images the missing folder of the gray ones is
+            // what should be named.
+            Err(missing) => match root(path, &COLOR_2012) {
+                Ok(root) => Self::list(root, &COLOR_2012),
+                Err(_) => Err(missing),
+            },
         }
     }
 
-    fn layout(&self, root: &Path) -> &'static Layout {
-        match self.year {
-            KittiYear::Y2015 => &COLOR_2015,
-            KittiYear::Y2012 if self.color || !root.join(GRAY_2012.left).is_dir() => {
-                // Without colour images the missing folder of the gray ones is
-                // what should be named.
-                let color = self.color || root.join(COLOR_2012.left).is_dir();
-                if color { &COLOR_2012 } else { &GRAY_2012 }
+    /// The colour images of 2012.
+    pub fn find_2012_in_color(path: &Path) -> Result<Self, DatasetError> {
+        Self::list(root(path, &COLOR_2012)?, &COLOR_2012)
+    }
+
+    /// The scenes of 2015.
+    pub fn find_2015(path: &Path) -> Result<Self, DatasetError> {
+        Self::list(root(path, &COLOR_2015)?, &COLOR_2015)
+    }
+
+    /// Scenes with their frame numbers, from the names of the left images.
+    fn list(root: PathBuf, folders: &'static Folders) -> Result<Self, DatasetError> {
+        let folder = root.join(folders.left);
+        let io = |source| DatasetError::Io { path: folder.clone(), source };
+        let mut scenes: BTreeMap<String, Vec<u32>> = BTreeMap::new();
+        for entry in fs::read_dir(&folder).map_err(io)? {
+            let name = entry.map_err(io)?.file_name();
+            let name = name.to_string_lossy();
+            let parts = name.strip_suffix(".png").and_then(|stem| stem.split_once('_'));
+            let Some((scene, number)) = parts else { continue };
+            if scene.bytes().all(|b| b.is_ascii_digit())
+                && number.len() == 2
+                && let Ok(number) = number.parse()
+            {
+                scenes.entry(scene.to_owned()).or_default().push(number);
             }
-            KittiYear::Y2012 => &GRAY_2012,
         }
+        if scenes.is_empty() {
+            return Err(DatasetError::Missing {
+                path: folder.join("NNNNNN_10.png"),
+                needed: "the folder holds no image of KITTI's naming".to_owned(),
+            });
+        }
+        for numbers in scenes.values_mut() {
+            numbers.sort_unstable();
+        }
+        let (names, numbers) = scenes.into_iter().unzip();
+        Ok(Self { root, folders, names, numbers })
     }
 
-    fn wanted(
-        &self,
-        mut scenes: BTreeMap<String, Vec<u32>>,
-        folder: &Path,
-    ) -> Result<BTreeMap<String, Vec<u32>>, DatasetError> {
-        let Some(wanted) = &self.scene else { return Ok(scenes) };
-        let bare = |name: &str| name.trim_start_matches('0').to_owned();
-        let found = scenes.keys().find(|name| bare(name) == bare(wanted)).cloned();
-        match found.and_then(|name| scenes.remove_entry(&name)) {
-            Some(scene) => Ok([scene].into()),
-            None => Err(DatasetError::NoScene {
-                path: folder.to_owned(),
-                scene: wanted.clone(),
-                available: some_of(scenes.keys()),
+    /// The truth of a frame, as far as it is there.
+    fn truth(&self, file: &str) -> TruthFiles {
+        let present = |folder: &str| {
+            let path = self.root.join(folder).join(file);
+            path.is_file().then_some(path)
+        };
+        let disparity = |folder: &str| {
+            let coding = DisparityCoding::Fixed16;
+            present(folder).map(|path| DisparityFile { path, coding, masks: Vec::new() })
+        };
+        let all = disparity(self.folders.all);
+        let flow = present("flow_occ").or_else(|| present("flow_noc"));
+        TruthFiles {
+            // What one cannot tell occluded pixels in is better than nothing.
+            disparity: disparity(self.folders.non_occluded).or_else(|| all.clone()),
+            disparity_with_occluded: all,
+            objects: present("obj_map").map(|path| ObjectFile { path, coding: ObjectCoding::Ids }),
+            flow: flow.map(|path| FlowFile {
+                path,
+                coding: FlowCoding::Fixed16,
+                masks: Vec::new(),
             }),
         }
     }
+}
 
-    fn scene(
-        &self,
-        root: &Path,
-        layout: &Layout,
-        name: String,
-        numbers: Vec<u32>,
-    ) -> Result<Scene, DatasetError> {
-        let calibration_path = root.join(layout.calibration).join(format!("{name}.txt"));
+impl Layout for Kitti {
+    fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    fn scene(&self, index: usize) -> Result<Scene, DatasetError> {
+        let (name, root, folders) = (self.names[index].clone(), &self.root, self.folders);
+        let calibration_path = root.join(folders.calibration).join(format!("{name}.txt"));
         present(&calibration_path, "the calibration of the scene")?;
-        let calibration = calibration(&calibration_path, layout.matrices)?;
-        let truth_folder = match self.truth {
-            KittiTruth::NonOccluded => layout.truth,
-            KittiTruth::All => [layout.truth[1], layout.truth[0]],
-        };
-        let frames: Result<Vec<FrameFiles>, DatasetError> = numbers
-            .into_iter()
-            .map(|number| {
+        let calibration = calibration(&calibration_path, folders.matrices)?;
+        let frames: Result<Vec<FrameFiles>, DatasetError> = self.numbers[index]
+            .iter()
+            .map(|&number| {
                 let file = format!("{name}_{number:02}.png");
-                let right = root.join(layout.right).join(&file);
+                let right = root.join(folders.right).join(&file);
                 present(&right, "the right image of the frame")?;
-                let truth = truth_folder.map(|folder| root.join(folder).join(&file));
-                let disparity = (number == TRUTH_FRAME)
-                    .then(|| truth.into_iter().find(|path| path.is_file()))
-                    .flatten();
-                Ok(FrameFiles {
-                    left: root.join(layout.left).join(&file),
-                    right,
-                    disparity,
-                    number,
-                })
+                let mut frame =
+                    FrameFiles::pair(root.join(folders.left).join(&file), right, number);
+                if number == TRUTH_FRAME {
+                    frame.truth = self.truth(&file);
+                }
+                Ok(frame)
             })
             .collect();
-        Ok(Scene { name, frames: frames?, calibration, calibration_path })
+        Ok(Scene {
+            name,
+            frames: frames?,
+            calibration,
+            calibration_path,
+            monocular: false,
+            stills: false,
+            frame_rate_hz: FRAME_RATE_HZ,
+            notes: Vec::new(),
+        })
     }
+}
+
+/// `training`, `testing`, or the path itself: whichever has the left images.
+fn root(path: &Path, folders: &Folders) -> Result<PathBuf, DatasetError> {
+    let candidates = [path.to_owned(), path.join("training"), path.join("testing")];
+    candidates.into_iter().find(|root| root.join(folders.left).is_dir()).ok_or_else(|| {
+        DatasetError::Missing {
+            path: path.join("training").join(folders.left),
+            needed: "the left images of KITTI's published layout".to_owned(),
+        }
+    })
 }
 
 fn present(path: &Path, needed: &str) -> Result<(), DatasetError> {
@@ -200,47 +200,6 @@ fn present(path: &Path, needed: &str) -> Result<(), DatasetError> {
     }
     let needed = format!("{needed} in KITTI's published layout");
     Err(DatasetError::Missing { path: path.to_owned(), needed })
-}
-
-/// Scenes with their frame numbers, from the names of the left images.
-fn list(folder: &Path) -> Result<BTreeMap<String, Vec<u32>>, DatasetError> {
-    let io = |source| DatasetError::Io { path: folder.to_owned(), source };
-    if !folder.is_dir() {
-        return Err(DatasetError::Missing {
-            path: folder.to_owned(),
-            needed: "the left images of KITTI's published layout".to_owned(),
-        });
-    }
-    let mut scenes: BTreeMap<String, Vec<u32>> = BTreeMap::new();
-    for entry in fs::read_dir(folder).map_err(io)? {
-        let name = entry.map_err(io)?.file_name();
-        let name = name.to_string_lossy();
-        let parts = name.strip_suffix(".png").and_then(|stem| stem.split_once('_'));
-        let Some((scene, number)) = parts else { continue };
-        if scene.bytes().all(|b| b.is_ascii_digit())
-            && number.len() == 2
-            && let Ok(number) = number.parse()
-        {
-            scenes.entry(scene.to_owned()).or_default().push(number);
-        }
-    }
-    if scenes.is_empty() {
-        return Err(DatasetError::Missing {
-            path: folder.join("NNNNNN_10.png"),
-            needed: "the folder holds no image of KITTI's naming".to_owned(),
-        });
-    }
-    for numbers in scenes.values_mut() {
-        numbers.sort_unstable();
-    }
-    Ok(scenes)
-}
-
-fn some_of<'a>(names: impl ExactSizeIterator<Item = &'a String>) -> String {
-    const MOST: usize = 20;
-    let more = names.len().saturating_sub(MOST);
-    let text = names.take(MOST).map(String::as_str).collect::<Vec<_>>().join(", ");
-    if more > 0 { format!("{text} and {more} more") } else { text }
 }
 
 /// Focal length, principal points and baseline from two projection matrices:

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::{Calibration, DatasetError, DatasetSource, FrameFiles, Scene};
+use super::{
+    Calibration, DatasetError, DatasetSource, DisparityCoding, DisparityFile, FrameFiles, Scene,
+};
 
 /// A rectified pair as two files.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,16 +56,21 @@ impl PairFiles {
             }
         };
         let name = self.left.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let mut frame = FrameFiles::pair(self.left.clone(), self.right, 0);
+        frame.truth.disparity = self.disparity.map(|path| DisparityFile {
+            path,
+            coding: DisparityCoding::Fixed16,
+            masks: Vec::new(),
+        });
         Ok(DatasetSource::new(vec![Scene {
             name,
-            calibration_path: self.left.clone(),
-            frames: vec![FrameFiles {
-                left: self.left,
-                right: self.right,
-                disparity: self.disparity,
-                number: 0,
-            }],
+            calibration_path: self.left,
+            frames: vec![frame],
             calibration,
+            monocular: false,
+            stills: true,
+            frame_rate_hz: super::scene::STILLS_RATE_HZ,
+            notes: Vec::new(),
         }]))
     }
 }

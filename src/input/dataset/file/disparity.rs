@@ -1,0 +1,40 @@
+//! Disparity maps.
+
+use std::path::Path;
+
+use image::DynamicImage;
+
+use super::super::{DatasetError, DisparityCoding};
+use super::{decode, fault, gray, no_pixels, pfm, size_of};
+use crate::image::Image;
+
+/// The disparity `x_l - x_r` in pixels that a file holds, NaN where unknown.
+///
+/// # Errors
+/// When the file cannot be read or holds something else.
+pub fn read(path: &Path, coding: DisparityCoding) -> Result<Image<f32>, DatasetError> {
+    match coding {
+        DisparityCoding::Fixed16 => fixed16(path),
+        DisparityCoding::Fixed8 { levels_per_px } => fixed8(path, levels_per_px),
+        DisparityCoding::Pfm => pfm::read(path),
+    }
+}
+
+fn fixed16(path: &Path) -> Result<Image<f32>, DatasetError> {
+    let decoded = decode(path)?;
+    let size = size_of(&decoded);
+    let DynamicImage::ImageLuma16(coded) = decoded else {
+        let found = decoded.color();
+        return Err(fault(path, &format!("16-bit gray is needed for disparity, not {found:?}")));
+    };
+    let values = coded.into_raw();
+    let values = values.into_iter().map(|v| if v == 0 { f32::NAN } else { f32::from(v) / 256.0 });
+    Image::from_vec(size, values.collect()).ok_or_else(|| no_pixels(path))
+}
+
+fn fixed8(path: &Path, levels_per_px: f32) -> Result<Image<f32>, DatasetError> {
+    let coded = gray(path, decode(path)?)?;
+    let value = |v: &u8| if *v == 0 { f32::NAN } else { f32::from(*v) / levels_per_px };
+    let values = coded.pixels().iter().map(value).collect();
+    Image::from_vec(coded.size(), values).ok_or_else(|| no_pixels(path))
+}
