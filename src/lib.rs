@@ -16,7 +16,7 @@
 //! | `output` | doors out: live topics, bags, the HTML report |
 //! | `ros` | messages, conversions, parameters, the node |
 //! | `metric` | what the field measures, and stage times over many frames |
-//! | `evaluation` | measured tables: methods on data with truth |
+//! | `evaluation`, `table` | measured tables: methods on data with truth |
 //! | `drive`, `command` | sources paired with sinks, and the command line |
 //!
 //! Without the default feature `tool` only the core remains, which knows no
@@ -48,3 +48,5 @@ pub mod simd;
 pub mod stage;
 pub mod stamp;
 pub mod sync;
+#[cfg(feature = "tool")]
+pub mod table;

@@ -1,6 +1,7 @@
 //! Doors out: where perceptions go.
 
 pub mod bag;
+pub(crate) mod html;
 pub mod live;
 pub mod picture;
 pub mod report;

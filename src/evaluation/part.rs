@@ -67,6 +67,34 @@ pub struct Part {
     pub gallery: Vec<Shot>,
 }
 
+impl Part {
+    /// Adds what was measured of another scene. Data set, scene, method, run
+    /// and size stay those of the first one.
+    pub fn merge(&mut self, other: &Self) {
+        self.frames += other.frames;
+        for (reason, count) in &other.skipped {
+            *self.skipped.entry(reason.clone()).or_default() += count;
+        }
+        self.monocular &= other.monocular;
+        self.times.extend_from_slice(&other.times);
+        self.matched.merge(&other.matched);
+        self.salient.merge(&other.salient);
+        self.scores.merge(&other.scores);
+        self.frame.merge(&other.frame);
+        self.filled_roi.merge(&other.filled_roi);
+        self.filled_frame.merge(&other.filled_frame);
+        self.errors.merge(&other.errors);
+        self.sparsification.merge(&other.sparsification);
+        self.map.merge(&other.map);
+        self.stretched_map.merge(&other.stretched_map);
+        self.video.merge(&other.video);
+        self.continuity.merge(&other.continuity);
+        self.true_continuity.merge(&other.true_continuity);
+        self.boundary.merge(&other.boundary);
+        self.gallery.extend_from_slice(&other.gallery);
+    }
+}
+
 /// The circumstances of a measurement.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Run {

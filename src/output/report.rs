@@ -14,9 +14,7 @@ mod frames;
 mod keep;
 mod layer;
 mod page;
-mod plot;
 mod scores;
-mod text;
 mod timing;
 
 use std::fs::{self, File};

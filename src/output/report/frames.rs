@@ -7,9 +7,9 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
 
 use super::layer::{BEYOND_COLOR, NEAR_COLOR, ValueLayer};
-use super::plot::round_step;
-use super::text::{hex, script_safe};
 use super::{Kept, ReportSink};
+use crate::output::html::plot::round_step;
+use crate::output::html::text::{hex, script_safe};
 use crate::output::picture::{BORDER, Colormap, INVALID, SALIENT, Scale};
 
 /// The colour scales of the whole run.

@@ -4,8 +4,8 @@ use serde_json::{Value, json};
 
 use super::ReportError;
 use super::layer::{Layer, OUTSIDE, ValueLayer};
-use super::text::hex;
 use crate::image::{Image, Size};
+use crate::output::html::text::hex;
 use crate::output::picture::{self, BORDER, Colormap, SALIENT};
 use crate::perception::{Perception, Region, TrackState};
 

@@ -5,10 +5,10 @@ use std::io::{self, Write};
 
 use serde_json::Value;
 
-use super::plot::Plot;
-use super::text::{count, escape, hex, metres, ms, or_dash, percent, utc};
 use super::{ReportSink, frames, scores, timing};
 use crate::config::{Config, SaliencyMode};
+use crate::output::html::plot::Plot;
+use crate::output::html::text::{count, escape, hex, metres, ms, or_dash, percent, utc};
 use crate::output::picture::track_color;
 
 const PAGE: &str = include_str!("page.html");

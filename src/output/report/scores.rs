@@ -1,9 +1,9 @@
 //! The section about the truth.
 
 use super::ReportSink;
-use super::plot::Plot;
-use super::text::{count, metres, or_dash, percent};
 use crate::metric::{DisparityScore, RegionScore};
+use crate::output::html::plot::Plot;
+use crate::output::html::text::{count, metres, or_dash, percent};
 
 /// Scores against the truth; empty when the source knows none.
 pub fn html(report: &ReportSink) -> String {

@@ -1,8 +1,8 @@
 //! Stage times: a table of percentiles and a plot over the frames.
 
-use super::plot::Plot;
-use super::text::{count, ms, percent};
 use crate::metric::{Percentiles, StageStats};
+use crate::output::html::plot::Plot;
+use crate::output::html::text::{count, ms, percent};
 use crate::perception::Stage;
 
 /// Most columns of the plot.

@@ -1,0 +1,294 @@
+//! Tables and report of an evaluation, from parts made by hand.
+
+use std::collections::BTreeMap;
+
+use salient_stereo::evaluation::{self, Evaluation, Part, Peer, Peers, Run};
+use salient_stereo::metric::{Confusion, DisparityStats, ErrorProfile, Mean};
+use salient_stereo::output::score::Scores;
+use salient_stereo::table::{Cell, Table};
+use serde_json::json;
+
+/// Counts of `scored` frames, of which `hits` of `objects` objects were found.
+fn scores(scored: u64, hits: u64, objects: u64, distances: &[f64]) -> Scores {
+    let mut value = serde_json::to_value(Scores::default()).unwrap();
+    value["frames"] = json!(scored);
+    value["scored"] = json!(scored);
+    for rows in ["masks", "boxes"] {
+        for counts in value[rows].as_array_mut().unwrap() {
+            *counts = json!({
+                "frames": scored, "true_positives": hits, "false_positives": 0,
+                "false_negatives": objects - hits,
+            });
+        }
+    }
+    value["roi_disparity"] = serde_json::to_value(disparity(90, 0.5, 10)).unwrap();
+    value["distance"] = json!({ "absolute": 1.0, "relative": distances });
+    serde_json::from_value(value).unwrap()
+}
+
+/// `known` pixels that are off by `error` and `holes` without an estimate.
+fn disparity(known: usize, error: f32, holes: usize) -> DisparityStats {
+    let mut stats = DisparityStats::default();
+    stats.add(std::iter::repeat_n((20.0 + error, 20.0), known));
+    stats.add(std::iter::repeat_n((f32::NAN, 20.0), holes));
+    stats
+}
+
+fn mean(value: f64) -> Mean {
+    let mut mean = Mean::default();
+    mean.add(value);
+    mean
+}
+
+fn run(changed: &[&str]) -> Run {
+    Run {
+        version: "0.1.0".into(),
+        commit: "0a1b2c3".into(),
+        config: format!("cfg{}", changed.len()),
+        changed: changed.iter().map(|&text| text.to_owned()).collect(),
+        seed: 7,
+        machine: "2 cores".into(),
+        threads: 2,
+    }
+}
+
+/// One scene of four frames that take `scale` milliseconds per stage and of
+/// which `tp` pixels are found.
+fn part(dataset: &str, scene: &str, method: &str, scale: f64, tp: u64) -> Part {
+    Part {
+        dataset: dataset.into(),
+        scene: scene.into(),
+        method: method.into(),
+        run: run(&["saliency.mode=x"]),
+        frames: 4,
+        size: [640, 480],
+        times: vec![[scale; 9]; 4],
+        matched: mean(0.25),
+        salient: Confusion {
+            true_positives: tp,
+            false_positives: 100 - tp,
+            false_negatives: 100 - tp,
+            true_negatives: 800,
+        },
+        scores: scores(4, 2, 4, &[0.02, 0.1, 0.04]),
+        frame: disparity(80, 1.0, 20),
+        filled_frame: disparity(100, 4.0, 0),
+        errors: ErrorProfile { bins: vec![DisparityStats::default(), disparity(50, 0.25, 0)] },
+        continuity: mean(0.9),
+        true_continuity: mean(0.95),
+        ..Part::default()
+    }
+}
+
+fn peer(scene: &str, matching_ms: f64) -> Peer {
+    Peer {
+        dataset: "kitti2012".into(),
+        scene: scene.into(),
+        method: "OpenCV SGBM".into(),
+        version: "5.0.0".into(),
+        threads: 1,
+        matching_ms,
+        epe_px: 2.0,
+        d1: 0.07,
+        bad_2: 0.1,
+        density: 0.83,
+        filled_d1: 0.14,
+        ..Peer::default()
+    }
+}
+
+fn evaluation() -> Evaluation {
+    Evaluation {
+        command: "salient_stereo evaluate kitti <folder>".into(),
+        parts: vec![
+            part("kitti2012", "000002", "scene", 1.0, 60),
+            part("kitti2012", "000001", "scene", 1.0, 80),
+            part("kitti2012", "000001", "full_frame", 4.0, 10),
+            part("kitti2012", "000001", "my_own", 2.0, 50),
+            part("kitti2012", "000001", "c2", 2.0, 50),
+            part("bag street", "a|b", "paper", 2.0, 50),
+        ],
+        peers: vec![peer("000001", 30.0), peer("000001", 20.0), peer("000002", 10.0)],
+        ..Evaluation::default()
+    }
+}
+
+fn find<'a>(tables: &'a [Table], start: &str) -> &'a Table {
+    tables.iter().find(|table| table.title.starts_with(start)).unwrap_or_else(|| panic!("{start}"))
+}
+
+/// The cell of the row and column of these names, as shown.
+fn cell(table: &Table, row: &str, column: &str) -> String {
+    let x =
+        table.columns.iter().position(|c| c.name == column).unwrap_or_else(|| panic!("{column}"));
+    let row = table.rows.iter().find(|r| r.cells[0] == Cell::text(row));
+    row.unwrap_or_else(|| panic!("no row")).cells[x].to_string()
+}
+
+#[test]
+fn merging_adds_every_count_up() {
+    let mut first = part("d", "1", "scene", 1.0, 60);
+    let mut second = part("d", "2", "scene", 3.0, 80);
+    first.skipped = BTreeMap::from([("no partner".into(), 1)]);
+    second.skipped = BTreeMap::from([("no partner".into(), 2), ("broken".into(), 4)]);
+    second.monocular = true;
+    second.errors.bins.push(disparity(7, 2.0, 0));
+    second.frame = disparity(80, 3.0, 20);
+    let mut sum = first.clone();
+    sum.merge(&second);
+    assert_eq!(sum.frames, 8);
+    assert_eq!(sum.skipped, BTreeMap::from([("no partner".into(), 3), ("broken".into(), 4)]));
+    assert!(!sum.monocular, "the first one has two cameras");
+    assert_eq!(sum.times.len(), 8);
+    assert_eq!(sum.salient.true_positives, 140);
+    assert_eq!(sum.matched.count, 2);
+    assert_eq!(sum.frame.total().unwrap().epe_px, 2.0);
+    assert_eq!(sum.filled_frame.total().unwrap().pixels, 200);
+    assert_eq!(sum.errors.bins.len(), 3);
+    assert_eq!(sum.errors.bins[1].total().unwrap().pixels, 100);
+    let summary = sum.scores.summary().unwrap();
+    assert_eq!((summary.frames, summary.main_regions().unwrap().true_positives), (8, 4));
+    assert_eq!(sum.continuity.count, 2);
+    assert_eq!((sum.scene.as_str(), sum.run), ("1", first.run.clone()));
+
+    // Adding nothing changes nothing.
+    let mut same = first.clone();
+    same.merge(&Part::default());
+    assert_eq!(same, first);
+}
+
+#[test]
+fn cells_are_what_was_counted() {
+    let tables = evaluation::tables(&evaluation());
+    let attention = find(&tables, "kitti2012: Table III-a");
+    let names: Vec<String> = attention.rows.iter().map(|row| row.cells[0].to_string()).collect();
+    let expected = ["full-frame SGM", "scene (ours)", "my_own", "paper's own figure (simulated)"];
+    assert_eq!(names, expected);
+    assert_eq!(cell(attention, "scene (ours)", "F1"), "0.700");
+    assert_eq!(cell(attention, "scene (ours)", "accuracy"), "0.935", "1740 of 1860");
+    assert_eq!(cell(attention, "scene (ours)", "ROI area, %"), "25.0");
+    assert_eq!(cell(attention, "scene (ours)", "Hz"), "111.1");
+    assert_eq!(cell(attention, "paper's own figure (simulated)", "F1"), "0.930");
+    assert_eq!(cell(attention, "paper's own figure (simulated)", "Hz"), "–");
+    assert!(attention.columns.iter().all(|column| column.name != "max-F"), "nothing measured it");
+
+    let stereo = find(&tables, "kitti2012: Table III-b");
+    assert_eq!(cell(stereo, "scene (ours)", "EPE in ROI, px"), "0.50");
+    assert_eq!(cell(stereo, "scene (ours)", "density in ROI, %"), "90.0");
+    assert_eq!(cell(stereo, "scene (ours)", "EPE, px"), "1.00");
+    assert_eq!(cell(stereo, "scene (ours)", "filled D1, %"), "100.00");
+    assert_eq!(cell(stereo, "OpenCV SGBM 5.0.0", "EPE, px"), "2.00");
+    assert_eq!(cell(stereo, "OpenCV SGBM 5.0.0", "D1, %"), "7.00");
+    assert_eq!(cell(stereo, "OpenCV SGBM 5.0.0", "matching, ms"), "20.0");
+    assert_eq!(cell(stereo, "OpenCV SGBM 5.0.0", "EPE in ROI, px"), "–");
+
+    let regions = find(&tables, "kitti2012: Table III-c");
+    // 2 of 4: F1 = 2 · 2 / (2 · 2 + 2).
+    assert_eq!(cell(regions, "scene (ours)", "region F1 @ .5"), "0.667");
+    assert_eq!(cell(regions, "scene (ours)", "distance error, %"), "4.0");
+
+    let stages = find(&tables, "kitti2012: Table IV");
+    assert_eq!(cell(stages, "scene (ours)", "coarse + stereo"), "2.00");
+    assert_eq!(cell(stages, "scene (ours)", "depth + regions + track"), "3.00");
+    assert_eq!(cell(stages, "scene (ours)", "p99"), "9.0");
+    assert_eq!(cell(stages, "scene (ours)", "saved in total, %"), "75.0");
+    assert_eq!(cell(stages, "my_own", "saved in matching, %"), "50.0");
+    assert_eq!(cell(stages, "full-frame SGM", "saved in total, %"), "–");
+    assert_eq!(cell(stages, "paper's own figure (simulated)", "saved in total, %"), "32.4");
+
+    let ablation = find(&tables, "kitti2012: Table V");
+    assert_eq!(cell(ablation, "c2: + colour", "F1"), "0.500");
+    let check = find(&tables, "kitti2012: fourth check");
+    assert_eq!(cell(check, "scene (ours)", "depth continuity, %"), "90.0");
+    assert_eq!(cell(check, "scene (ours)", "truth's own, %"), "95.0");
+
+    // Each data set has its own tables.
+    let other = find(&tables, "bag street: Table III-a");
+    assert_eq!(cell(other, "paper's fusion", "F1"), "0.500");
+    assert!(!tables.iter().any(|table| table.title.starts_with("bag street: Table V")));
+}
+
+#[test]
+fn tables_say_how_they_were_measured() {
+    let mut evaluation = evaluation();
+    let notes = |evaluation: &Evaluation| {
+        let tables = evaluation::tables(evaluation);
+        find(&tables, "kitti2012: Table III-b").notes.join("\n")
+    };
+    let text = notes(&evaluation);
+    for part in [
+        "scene (ours) 2 scenes, 8 frames, 640 × 480 px (first scene), none skipped",
+        "full-frame SGM 1 scene, 4 frames",
+        "Run: seed 7; salient_stereo version 0.1.0; commit 0a1b2c3; machine 2 cores, 2 threads.",
+        "Configuration: cfg1 (saliency.mode=x).",
+        "OpenCV SGBM 5.0.0: 3 pairs (the same scenes), 1 thread",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    evaluation.parts[0].run.seed = 8;
+    evaluation.parts[0].run.config = "other".into();
+    evaluation.parts[0].run.changed.clear();
+    evaluation.parts[1].skipped = BTreeMap::from([("broken".into(), 2)]);
+    evaluation.parts.push(evaluation.parts[1].clone());
+    let text = notes(&evaluation);
+    for part in [
+        "Merged from differing runs: seeds 7 / 8; salient_stereo version 0.1.0;",
+        "scene (ours) differs among its scenes: cfg1 (saliency.mode=x), other (defaults)",
+        "4 skipped (broken: 4)",
+        "3 scenes, 12 frames",
+        "of which only 2 are different",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+}
+
+#[test]
+fn the_order_of_parts_does_not_matter() {
+    let forth = evaluation();
+    let mut back = evaluation();
+    back.parts.reverse();
+    assert_eq!(evaluation::tables(&forth), evaluation::tables(&back));
+}
+
+#[test]
+fn nothing_measured_gives_no_table() {
+    assert!(evaluation::tables(&Evaluation::default()).is_empty());
+    let bare = Part { dataset: "d".into(), method: "scene".into(), ..Part::default() };
+    let evaluation = Evaluation { parts: vec![bare], ..Evaluation::default() };
+    assert!(evaluation::tables(&evaluation).is_empty());
+    assert_eq!(evaluation::json(&evaluation)["results"][0]["method"], "scene");
+}
+
+#[test]
+fn markdown_csv_and_json_hold_every_table() {
+    let evaluation = evaluation();
+    let tables = evaluation::tables(&evaluation);
+    let (markdown, csv) = (evaluation::markdown(&evaluation), evaluation::csv(&evaluation));
+    let json = evaluation::json(&evaluation);
+    for table in &tables {
+        assert!(markdown.contains(&format!("**{}**", table.title)));
+        assert!(csv.contains(&format!("# {}\n", table.title)) && csv.contains(&table.csv()));
+    }
+    assert!(markdown.contains(&evaluation.command));
+    assert_eq!(json["tables"].as_array().unwrap().len(), tables.len());
+    assert_eq!(json["results"].as_array().unwrap().len(), 5);
+    assert_eq!(json["results"][0]["scenes"][0], "a|b");
+    let figures = &json["results"][2]["figures"];
+    assert_eq!(figures["salient"]["f1"], 0.7);
+    assert_eq!(figures["errors"][0]["from_px"], 8.0);
+    assert_eq!(figures["errors"][0]["epe_px"], 0.25);
+    assert_eq!(json["peers"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn peers_are_read_with_and_without_what_may_be_unknown() {
+    let text = r#"{"peers": [{"dataset": "kitti2012", "scene": "000027", "method": "OpenCV SGBM",
+        "version": "5.0.0", "matching_ms": 310.5, "epe_px": 2.09, "d1": 0.072, "bad_2": 0.1,
+        "density": 0.827, "filled_d1": 0.141}]}"#;
+    let Peers { peers } = serde_json::from_str(text).unwrap();
+    assert_eq!((peers[0].threads, peers[0].matching_ms), (0, 310.5));
+    let alone = Evaluation { peers, ..Evaluation::default() };
+    let tables = evaluation::tables(&alone);
+    assert_eq!(tables.len(), 1, "a data set that only peers were measured on");
+    assert_eq!(cell(&tables[0], "OpenCV SGBM 5.0.0", "density, %"), "82.7");
+}
