@@ -148,8 +148,9 @@ fn copy_row(image: &mut Image<f32>, from: usize, to: usize) {
     image.pixels_mut().copy_within(from * width..(from + 1) * width, to * width);
 }
 
-/// False when there is nothing to fill from.
-fn fill_row(row: &mut [f32]) -> bool {
+/// Fills the holes (NaN) of one row with the smaller of their two neighbours;
+/// false when there is nothing to fill from.
+pub(crate) fn fill_row(row: &mut [f32]) -> bool {
     let mut x = 0;
     let mut left = None;
     while x < row.len() {

@@ -1,5 +1,8 @@
 //! The metrics against hand-computed cases and brute force.
 
+mod map;
+mod video;
+
 use salient_stereo::metric::{Confusion, DisparityStats, IdSwitches, Overlap, RegionCounts};
 
 /// Numbers that look random and are the same everywhere.
