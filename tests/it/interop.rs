@@ -1,4 +1,4 @@
-//! The node and peers of other makes. They need packages that cargo does not
+//! The node and peers of other makes, the metrics and referees. They need packages that cargo does not
 //! bring, so they run only when asked for:
 //!
 //! ```text
@@ -8,7 +8,9 @@
 //!
 //! `SALIENT_STEREO_PYTHON` names another interpreter than `python3`.
 
-use std::path::Path;
+mod referee;
+
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use salient_stereo::config::Config;
@@ -18,14 +20,22 @@ use salient_stereo::ros::names::Names;
 use salient_stereo::ros::runtime::{NodeOptions, NodeRuntime};
 use serde_json::json;
 
+/// A script of `tests/interop`; `None` unless such tests were asked for.
+fn script(name: &str) -> Option<PathBuf> {
+    if std::env::var_os("SALIENT_STEREO_INTEROP").is_none() {
+        println!("skipped: set SALIENT_STEREO_INTEROP=1 to test with {name}");
+        return None;
+    }
+    Some(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interop").join(name))
+}
+
+fn python() -> Command {
+    Command::new(std::env::var_os("SALIENT_STEREO_PYTHON").unwrap_or_else(|| "python3".into()))
+}
+
 #[test]
 fn a_cyclone_peer_gets_one_region_array_per_pair() {
-    if std::env::var_os("SALIENT_STEREO_INTEROP").is_none() {
-        println!("skipped: set SALIENT_STEREO_INTEROP=1 to test with a Cyclone DDS peer");
-        return;
-    }
-    let python = std::env::var("SALIENT_STEREO_PYTHON").unwrap_or_else(|_| "python3".into());
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interop/cyclone_stereo.py");
+    let Some(script) = script("cyclone_stereo.py") else { return };
     for (test, reliability) in [(3, "reliable"), (3, "best_effort")] {
         let domain = 1 + (std::process::id() % 24) as u16 * 4 + test;
         let names = Names::new("/robot", NODE_NAME, &[]).unwrap();
@@ -34,13 +44,13 @@ fn a_cyclone_peer_gets_one_region_array_per_pair() {
             NodeRuntime::start(NodeOptions::new(config, names, Environment::localhost(domain)))
                 .unwrap();
         // Small and slow: this is about the wire, not about load.
-        let output = Command::new(&python)
+        let output = python()
             .arg(&script)
             .args(["--domain", &domain.to_string(), "--namespace", "/robot"])
             .args(["--pairs", "20", "--rate", "2", "--width", "320", "--height", "120"])
             .args(["--reliability", reliability])
             .output()
-            .unwrap_or_else(|e| panic!("{python}: {e}"));
+            .unwrap_or_else(|e| panic!("{}: {e}", python().get_program().display()));
         println!("{}", String::from_utf8_lossy(&output.stdout));
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert_eq!(runtime.status().totals().paired, 20);
