@@ -12,6 +12,8 @@ mod figures;
 mod group;
 pub mod part;
 mod peer;
+pub mod readme;
+pub mod report;
 mod tables;
 
 use std::path::PathBuf;

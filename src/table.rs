@@ -105,23 +105,25 @@ pub struct Table {
 
 impl Table {
     /// True when the cell is the best one of its column, as shown: equal
-    /// texts are equally good. A lone value is not the best of anything.
+    /// texts are equally good. Where all are equal, none is.
     pub fn is_best(&self, row: usize, column: usize) -> bool {
         let Some(best) = self.columns.get(column).and_then(|c| c.best) else { return false };
         let cell = |row: &Row| row.cells.get(column).cloned().filter(|_| !row.quoted);
         let Some(own) = self.rows.get(row).and_then(cell) else { return false };
         let Some(value) = own.value() else { return false };
-        let (mut others, mut beaten) = (0, false);
+        let (mut beats, mut beaten) = (false, false);
         for other in self.rows.iter().filter_map(cell) {
             let Some(rival) = other.value() else { continue };
-            others += 1;
             let ahead = match best {
                 Best::Highest => rival > value,
                 Best::Lowest => rival < value,
             };
-            beaten |= ahead && other.to_string() != own.to_string();
+            if other.to_string() != own.to_string() {
+                beaten |= ahead;
+                beats |= !ahead;
+            }
         }
-        others > 1 && !beaten
+        beats && !beaten
     }
 
     /// True for columns of numbers, which stand to the right.
@@ -263,7 +265,7 @@ mod tests {
             rows: vec![
                 row("a|b", Some(0.504), 12.04, false),
                 row("c, \"d\"", None, 0.96, false),
-                row("<e>", Some(0.5), 0.97, false),
+                row("<e>", Some(0.25), 0.97, false),
                 row("paper", Some(0.93), f64::NAN, true),
             ],
         }
@@ -274,12 +276,12 @@ mod tests {
         let expected = "\
 **T**
 
-| method    |       F1 |  EPE px |
-| :-------- | -------: | ------: |
-| a\\|b      | **0.50** |    12.0 |
-| c, \"d\"    |        – | **1.0** |
-| &lt;e>    | **0.50** | **1.0** |
-| paper     |     0.93 |       – |
+| method |       F1 |  EPE px |
+| :----- | -------: | ------: |
+| a\\|b   | **0.50** |    12.0 |
+| c, \"d\" |        – | **1.0** |
+| &lt;e> |     0.25 | **1.0** |
+| paper  |     0.93 |       – |
 
 - seed 1
 ";
@@ -291,9 +293,20 @@ mod tests {
     }
 
     #[test]
+    fn of_equals_none_is_the_best() {
+        let mut table = table();
+        assert!(table.is_best(0, 1) && !table.is_best(2, 1) && !table.is_best(3, 1));
+        table.rows.truncate(2);
+        assert!(!table.is_best(0, 1), "a lone value");
+        table.rows[1].cells[1] = Cell::number(0.496, 2);
+        assert!(!table.is_best(0, 1), "both are shown as 0.50");
+        assert!(!table.is_best(9, 1) && !table.is_best(0, 9) && !table.is_best(0, 0));
+    }
+
+    #[test]
     fn csv_is_quoted_and_leaves_out_what_is_missing() {
         let expected =
-            "method,F1,EPE px\na|b,0.50,12.0\n\"c, \"\"d\"\"\",,1.0\n<e>,0.50,1.0\npaper,0.93,\n";
+            "method,F1,EPE px\na|b,0.50,12.0\n\"c, \"\"d\"\"\",,1.0\n<e>,0.25,1.0\npaper,0.93,\n";
         assert_eq!(table().csv(), expected);
     }
 

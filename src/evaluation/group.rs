@@ -23,6 +23,9 @@ const METHODS: [(&str, &str); 12] = [
 /// The method that all time is saved against.
 pub const FULL_FRAME: &str = "full_frame";
 
+/// What that method is called on the pairs of the peers alone.
+const SAME_PAIRS: &str = "full-frame SGM on the peers' pairs";
+
 /// The method that is ours.
 pub const OURS: &str = "scene";
 
@@ -80,6 +83,11 @@ pub fn label(method: &str) -> &str {
     METHODS.iter().find(|(name, _)| *name == method).map_or(method, |(_, label)| label)
 }
 
+/// Where a method that is listed stands among the others.
+pub fn place(method: &str) -> Option<usize> {
+    METHODS.iter().position(|(name, _)| *name == method)
+}
+
 /// One of the others' matchers on all pairs of one data set.
 #[derive(Clone, Debug)]
 pub struct PeerTotal {
@@ -124,6 +132,9 @@ pub struct Group {
     pub methods: Vec<Merged>,
     /// The others' matchers, by name.
     pub peers: Vec<PeerTotal>,
+    /// The full-frame baseline on the pairs of the peers, where those are not
+    /// all of its own.
+    pub same_pairs: Option<Merged>,
 }
 
 impl Group {
@@ -140,9 +151,18 @@ impl Group {
         for part in evaluation.parts.iter().filter(|part| part.dataset == dataset) {
             by_method.entry(&part.method).or_default().push(part);
         }
+        let mut same_pairs = by_method.get(FULL_FRAME).cloned().unwrap_or_default();
+        let pairs = same_pairs.len();
+        let of_peers: BTreeSet<&str> = evaluation
+            .peers
+            .iter()
+            .filter(|peer| peer.dataset == dataset)
+            .map(|peer| peer.scene.as_str())
+            .collect();
+        same_pairs.retain(|part| of_peers.contains(part.scene.as_str()));
+        let same_pairs = if same_pairs.len() < pairs { same_pairs } else { Vec::new() };
         let mut methods: Vec<Merged> =
             by_method.into_iter().filter_map(|(name, parts)| Merged::of(name, parts)).collect();
-        let place = |method: &str| METHODS.iter().position(|(name, _)| *name == method);
         // Methods that are not listed come after the listed ones, by name.
         methods.sort_by_key(|merged| place(&merged.method).unwrap_or(METHODS.len()));
         let baseline = methods.iter().find(|merged| merged.method == FULL_FRAME);
@@ -156,7 +176,12 @@ impl Group {
             by_peer.entry((&peer.method, &peer.version)).or_default().push(peer);
         }
         let peers = by_peer.iter().filter_map(|((name, _), peers)| PeerTotal::of(name, peers));
-        Self { dataset: dataset.to_owned(), peers: peers.collect(), methods }
+        Self {
+            dataset: dataset.to_owned(),
+            peers: peers.collect(),
+            methods,
+            same_pairs: Merged::of(SAME_PAIRS, same_pairs),
+        }
     }
 
     /// The methods that are compared with each other.

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use super::Evaluation;
 use super::group::{Group, Merged, PeerTotal};
 use crate::table::{Cell, Column, Row, Table};
-pub use circumstances::circumstances;
+pub use circumstances::{circumstances, data, peer_notes, runs};
 pub use measure::{Measure, find as measure};
 pub use simulated::simulated;
 
@@ -86,7 +86,7 @@ pub fn json(evaluation: &Evaluation) -> Value {
 /// Builds a table of one row per method and, where `peers` are given, one per
 /// peer. Columns without any measured value are left out; `None` when none
 /// remains.
-fn build(
+pub fn build(
     title: &str,
     group: &Group,
     rows: &[&Merged],
@@ -138,6 +138,6 @@ fn build(
 }
 
 /// Finds the measures of a table by their keys.
-fn measures(keys: &[&str]) -> Vec<&'static Measure> {
+pub fn measures(keys: &[&str]) -> Vec<&'static Measure> {
     keys.iter().filter_map(|key| measure(key)).collect()
 }

@@ -6,5 +6,7 @@
     reason = "a page is put together once per run: that it can be read counts, not an allocation"
 )]
 
+pub mod page;
 pub mod plot;
+pub mod template;
 pub mod text;

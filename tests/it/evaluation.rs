@@ -1,8 +1,11 @@
 //! Tables and report of an evaluation, from parts made by hand.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
-use salient_stereo::evaluation::{self, Evaluation, Part, Peer, Peers, Run};
+use salient_stereo::evaluation::readme::{self, SpliceError};
+use salient_stereo::evaluation::{self, Evaluation, Part, Peer, Peers, Run, Shot, report};
+use salient_stereo::image::{Image, Size};
 use salient_stereo::metric::{Confusion, DisparityStats, ErrorProfile, Mean};
 use salient_stereo::output::score::Scores;
 use salient_stereo::table::{Cell, Table};
@@ -154,7 +157,9 @@ fn merging_adds_every_count_up() {
     // Adding nothing changes nothing.
     let mut same = first.clone();
     same.merge(&Part::default());
-    assert_eq!(same, first);
+    let figures =
+        |part: Part| evaluation::json(&Evaluation { parts: vec![part], ..Evaluation::default() });
+    assert_eq!(figures(same), figures(first));
 }
 
 #[test]
@@ -198,7 +203,7 @@ fn cells_are_what_was_counted() {
 
     let ablation = find(&tables, "kitti2012: Table V");
     assert_eq!(cell(ablation, "c2: + colour", "F1"), "0.500");
-    let check = find(&tables, "kitti2012: fourth check");
+    let check = find(&tables, "kitti2012: Fourth check");
     assert_eq!(cell(check, "scene (ours)", "depth continuity, %"), "90.0");
     assert_eq!(cell(check, "scene (ours)", "truth's own, %"), "95.0");
 
@@ -206,6 +211,24 @@ fn cells_are_what_was_counted() {
     let other = find(&tables, "bag street: Table III-a");
     assert_eq!(cell(other, "paper's fusion", "F1"), "0.500");
     assert!(!tables.iter().any(|table| table.title.starts_with("bag street: Table V")));
+}
+
+#[test]
+fn peers_are_compared_on_their_own_pairs() {
+    let mut evaluation = evaluation();
+    evaluation.parts.push(Part {
+        frame: disparity(80, 5.0, 20),
+        ..part("kitti2012", "000009", "full_frame", 4.0, 10)
+    });
+    let tables = evaluation::tables(&evaluation);
+    let stereo = find(&tables, "kitti2012: Table III-b");
+    assert_eq!(cell(stereo, "full-frame SGM", "EPE, px"), "3.00");
+    assert_eq!(cell(stereo, "full-frame SGM on the peers' pairs", "EPE, px"), "1.00");
+    let text = readme::section(&evaluation);
+    assert!(
+        text.contains("- full-frame SGM on the peers' pairs, better: matching on 2 threads is"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -291,4 +314,195 @@ fn peers_are_read_with_and_without_what_may_be_unknown() {
     let tables = evaluation::tables(&alone);
     assert_eq!(tables.len(), 1, "a data set that only peers were measured on");
     assert_eq!(cell(&tables[0], "OpenCV SGBM 5.0.0", "density, %"), "82.7");
+}
+
+fn html(evaluation: &Evaluation) -> String {
+    let mut out = Vec::new();
+    report::write(evaluation, &mut out).unwrap();
+    String::from_utf8(out).unwrap()
+}
+
+fn shot(role: &str, value: f64, file: &str) -> Shot {
+    Shot { role: role.into(), frame: 3, measure: "EPE".into(), value, file: file.into() }
+}
+
+#[test]
+fn the_report_is_one_whole_page_with_every_table() {
+    let evaluation = evaluation();
+    let page = html(&evaluation);
+    assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
+    assert!(!page.contains("{{") && !page.contains("NaN") && !page.contains("<script"));
+    for outside in ["http:", "https:", "src=\"/", "@import", "url("] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    for table in evaluation::tables(&evaluation) {
+        let (_, title) = table.title.split_once(": ").unwrap();
+        assert!(page.contains(&format!("<h2>{title}</h2>")), "{title}");
+    }
+    // Every entry of the contents leads somewhere.
+    for target in page.split("href=\"#").skip(1) {
+        let id = target.split('"').next().unwrap();
+        assert_eq!(page.matches(&format!("id=\"{id}\"")).count(), 1, "{id}");
+    }
+    assert!(page.contains("evaluate kitti &lt;folder&gt;"));
+    assert!(page.contains("−75 %"), "the bar says what is saved");
+    assert!(page.contains("class=\"n best\">0.700"));
+    assert!(!page.contains("class=\"n best\">0.930"), "quoted values are not marked");
+    assert!(html(&Evaluation::default()).contains("Nothing was measured."));
+}
+
+#[test]
+fn names_cannot_leave_their_place_on_the_page() {
+    let evil = "</td><img src=x onerror=\"alert(1)\">'&{{words}}";
+    let mut one = part(evil, evil, evil, 1.0, 50);
+    one.run.machine = evil.into();
+    one.run.changed = vec![evil.into()];
+    one.skipped = BTreeMap::from([(evil.into(), 1)]);
+    one.gallery = vec![Shot {
+        role: evil.into(),
+        measure: evil.into(),
+        file: evil.into(),
+        ..Shot::default()
+    }];
+    let other =
+        Peer { dataset: evil.into(), method: evil.into(), version: evil.into(), ..peer(evil, 1.0) };
+    let page = html(&Evaluation {
+        command: evil.into(),
+        parts: vec![one],
+        peers: vec![other],
+        folder: PathBuf::from(evil),
+    });
+    assert!(!page.contains("<img src=x"), "markup got through");
+    assert!(
+        page.contains(
+            "&lt;/td&gt;&lt;img src=x onerror=&quot;alert(1)&quot;&gt;&#39;&amp;{{words}}"
+        )
+    );
+}
+
+#[test]
+fn the_gallery_shows_the_best_and_the_worst_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    };
+    for name in ["good.jpg", "bad.jpg", "worse.jpg", "worst.jpg"] {
+        picture(name, &[&[0xff, 0xd8, 0xff], name.as_bytes()].concat());
+    }
+    picture("text.jpg", b"no picture");
+    picture("large.jpg", &[[0xff, 0xd8, 0xff].as_slice(), &vec![0; 5 << 20]].concat());
+    let mut evaluation = evaluation();
+    evaluation.folder = folder.path().to_owned();
+    evaluation.parts[0].gallery =
+        vec![shot("best", 0.3, "good.jpg"), shot("worst", 5.0, "bad.jpg")];
+    evaluation.parts[1].gallery = vec![
+        shot("best", 0.2, "text.jpg"),
+        shot("worst", 7.0, "worst.jpg"),
+        shot("worst", 6.0, "worse.jpg"),
+    ];
+    evaluation.parts[2].gallery = vec![
+        shot("best", 0.1, "../good.jpg"),
+        shot("best", 0.2, "gone.jpg"),
+        shot("worst", 1.0, "large.jpg"),
+    ];
+    let page = html(&evaluation);
+    assert_eq!(page.matches("data:image/jpeg;base64,").count(), 3, "good, worst, worse");
+    let order: Vec<usize> =
+        ["000001, frame 3 · EPE 0.200", "000002, frame 3 · EPE 0.300", "EPE 7.000", "EPE 6.000"]
+            .iter()
+            .map(|text| page.find(text).unwrap_or_else(|| panic!("{text}")))
+            .collect();
+    assert!(order.is_sorted(), "{order:?}");
+    assert!(!page.contains("EPE 5.000"), "two of a kind are enough");
+    for reason in [
+        "text.jpg is no JPEG",
+        "“../good.jpg” is no plain file name",
+        "gone.jpg: ",
+        "large.jpg is larger",
+    ] {
+        assert!(page.contains(reason), "{reason}");
+    }
+}
+
+#[test]
+fn the_section_goes_between_its_markers() {
+    let readme =
+        "# A\n<!-- evaluation: begin (made by evaluate) -->\nold\n\n<!-- evaluation: end -->\nrest";
+    let expected = "# A\n<!-- evaluation: begin (made by evaluate) -->\n\nnew\nlines\n\n<!-- evaluation: end -->\nrest";
+    let spliced = readme::splice(readme, "new\nlines\n").unwrap();
+    assert_eq!(spliced, expected);
+    assert_eq!(
+        readme::splice(&spliced, "new\nlines").unwrap(),
+        expected,
+        "twice is as good as once"
+    );
+
+    let begin = "<!-- evaluation: begin";
+    let error = readme::splice("# A\n<!-- evaluation: end -->\n", "x").unwrap_err();
+    assert_eq!(error, SpliceError::Count { marker: begin, count: 0 });
+    assert!(
+        error.to_string().contains("0 lines that begin with \"<!-- evaluation: begin\""),
+        "{error}"
+    );
+    let twice = readme.repeat(2).replace("rest# A", "");
+    assert_eq!(readme::splice(&twice, "x"), Err(SpliceError::Count { marker: begin, count: 2 }));
+    let back = "<!-- evaluation: end -->\n<!-- evaluation: begin -->\n";
+    assert_eq!(readme::splice(back, "x"), Err(SpliceError::Order { begin: 2, end: 1 }));
+}
+
+#[test]
+fn the_section_says_what_is_won_and_what_is_lost() {
+    let mut evaluation = evaluation();
+    evaluation.parts.push(part("kitti2012", "000001", "paper", 2.0, 90));
+    evaluation.parts.push(part("kitti2012", "000002", "full_frame", 4.0, 10));
+    let text = readme::section(&evaluation);
+    for part in [
+        "## How good is it, really",
+        "Measured by `salient_stereo evaluate kitti <folder>`.",
+        "### kitti2012",
+        "2 scenes, 8 frames, 640 × 480 px (first scene), none skipped. OpenCV SGBM 5.0.0: 3 pairs",
+        "- scene (ours), better: a frame is 4.0x faster than full-frame SGM; saved in total 75.0 % (the paper's simulation 32.4).",
+        "- scene (ours), worse: F1 0.700 (paper's fusion 0.900, the paper's simulation 0.930); ",
+        "- full-frame SGM, better: matching on 2 threads is 1.7x faster than OpenCV SGBM 5.0.0 on 1 thread; EPE 1.00 px (OpenCV SGBM 5.0.0 2.00); ",
+        "- full-frame SGM, worse: density 80.0 % (OpenCV SGBM 5.0.0 83.0)",
+        "### bag street",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    assert!(text.lines().count() < 50, "{}", text.lines().count());
+}
+
+#[test]
+fn maps_videos_and_confidence_are_shown_as_they_were_measured() {
+    let size = Size::new(40, 30);
+    let mask = Image::from_fn(size, |x, y| if x < 20 && y < 15 { 255 } else { 0 });
+    // Bright on the object, and as bright on a stripe beside it.
+    let map = Image::from_fn(size, |x, y| if x < 24 && y < 15 { 200 } else { (x + y) as u8 });
+    let mut one = part("kitti2012", "000001", "scene", 1.0, 80);
+    assert!(one.map.add(&map, &mask) && one.stretched_map.add_stretched(&map, &mask));
+    one.video.begin_video();
+    for _ in 0..8 {
+        one.video.add_frame(&Image::from_fn(size, |x, y| u8::from(x < 24 && y < 15)), &mask);
+    }
+    // The larger the error the less the confidence.
+    let mut pixels: Vec<(f32, f32)> =
+        (0..100_u8).map(|i| (f32::from(100 - i), f32::from(i))).collect();
+    one.sparsification.add(&mut pixels);
+    let (score, ause) = (one.map.total().unwrap(), one.sparsification.total().unwrap().ause);
+    let evaluation = Evaluation { parts: vec![one], ..Evaluation::default() };
+    let tables = evaluation::tables(&evaluation);
+    let attention = find(&tables, "kitti2012: Table III-a");
+    // 300 of the 360 bright pixels, all of the object: 1.3 P / (0.3 P + 1), β² = 0.3.
+    assert_eq!(cell(attention, "scene (ours)", "max-F"), "0.867");
+    assert_eq!(cell(attention, "scene (ours)", "S"), format!("{:.3}", score.s_measure));
+    let check = find(&tables, "kitti2012: Fourth check");
+    assert_eq!(cell(check, "scene (ours)", "J mean"), "0.833");
+    let stereo = find(&tables, "kitti2012: Table III-b");
+    assert_eq!(cell(stereo, "scene (ours)", "AUSE"), format!("{ause:.3}"));
+    let page = html(&evaluation);
+    for plot in ["Precision", "Recall", "End-point error", "Sparsification"] {
+        assert!(page.contains(&format!("<b>{plot}</b>")), "{plot}");
+    }
+    let figures = &evaluation::json(&evaluation)["results"][0]["figures"];
+    assert_eq!(figures["map"]["precision"].as_array().unwrap().len(), 256);
 }

@@ -21,5 +21,5 @@ const COLUMNS: [&str; 11] = [
 /// The fourth check; `None` when nothing of it was measured.
 pub fn table(group: &Group) -> Option<Table> {
     let rows = group.compared();
-    build("fourth check, continuity and contours", group, &rows, &[], &measures(&COLUMNS))
+    build("Fourth check, continuity and contours", group, &rows, &[], &measures(&COLUMNS))
 }

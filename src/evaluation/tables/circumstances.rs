@@ -13,7 +13,7 @@ pub fn circumstances(rows: &[&Merged], peers: &[&PeerTotal]) -> Vec<String> {
     notes.extend(per_method("Data: ", rows, data));
     notes.extend(runs(rows));
     notes.extend(configurations(rows));
-    notes.extend(peers.iter().map(|peer| peer_note(peer, rows)));
+    notes.extend(peer_notes(peers, rows));
     notes
 }
 
@@ -28,7 +28,8 @@ fn per_method(head: &str, rows: &[&Merged], text: impl Fn(&Merged) -> String) ->
     Some(format!("{head}{}.", each.collect::<Vec<_>>().join("; ")))
 }
 
-fn data(merged: &Merged) -> String {
+/// Scenes, frames, size and losses of one method.
+pub fn data(merged: &Merged) -> String {
     let total = &merged.total;
     let scenes = merged.scenes.len();
     let mut parts = vec![count(scenes as u64, "scene"), count(total.frames, "frame")];
@@ -55,7 +56,8 @@ fn data(merged: &Merged) -> String {
     parts.join(", ")
 }
 
-fn runs(rows: &[&Merged]) -> Option<String> {
+/// Seed, version, commit and machine; what differs is listed.
+pub fn runs(rows: &[&Merged]) -> Option<String> {
     let all: Vec<&Run> = rows.iter().flat_map(|merged| &merged.runs).collect();
     all.first()?;
     let mut differing = false;
@@ -97,28 +99,37 @@ fn configurations(rows: &[&Merged]) -> Option<String> {
     })
 }
 
-fn peer_note(peer: &PeerTotal, rows: &[&Merged]) -> String {
+/// What the peers were measured on; those on the same pairs in one sentence.
+pub fn peer_notes(peers: &[&PeerTotal], rows: &[&Merged]) -> Vec<String> {
+    let mut notes: Vec<(String, Vec<&str>)> = Vec::new();
+    for peer in peers {
+        let text = pairs(peer, rows);
+        match notes.iter_mut().find(|(other, _)| *other == text) {
+            Some((_, labels)) => labels.push(&peer.label),
+            None => notes.push((text, vec![&peer.label])),
+        }
+    }
+    notes.iter().map(|(text, labels)| format!("{}: {text}", labels.join(", "))).collect()
+}
+
+fn pairs(peer: &PeerTotal, rows: &[&Merged]) -> String {
     let ours: BTreeSet<&String> = rows.iter().flat_map(|merged| &merged.scenes).collect();
     let theirs: BTreeSet<&String> = peer.scenes.iter().collect();
     let which = if ours == theirs {
         " (the same scenes)".to_owned()
-    } else if !ours.is_empty() {
-        format!(
-            " ({} of our {})",
-            theirs.intersection(&ours).count(),
-            count(ours.len() as u64, "scene")
-        )
-    } else {
+    } else if ours.is_empty() {
         String::new()
+    } else {
+        let both = theirs.intersection(&ours).count();
+        format!(" ({both} of our {})", count(ours.len() as u64, "scene"))
     };
-    let pairs = count(peer.scenes.len() as u64, "pair");
-    let mut parts = vec![format!("{}: {pairs}{which}", peer.label)];
+    let mut parts = vec![count(peer.scenes.len() as u64, "pair") + &which];
     if peer.mean.threads > 0 {
         parts.push(count(peer.mean.threads as u64, "thread"));
     }
     if !peer.mean.machine.is_empty() {
         parts.push(peer.mean.machine.clone());
     }
-    parts.push("mean over the pairs; time is the median.".into());
+    parts.push("means over the pairs, of the time the median.".into());
     parts.join(", ")
 }

@@ -14,7 +14,11 @@ pub struct Measure {
     pub name: &'static str,
     /// What it means.
     pub help: &'static str,
-    best: Option<Best>,
+    /// Which value is the better one of two that can be compared.
+    pub best: Option<Best>,
+    /// Whether the best value of a column is marked: not where the rows are
+    /// over different pixels.
+    marked: bool,
     unit: Unit,
     of: fn(&Figures) -> Option<f64>,
     peer: Option<fn(&Peer) -> f64>,
@@ -53,7 +57,11 @@ impl Measure {
 
     /// The head of its column.
     pub fn column(&self) -> Column {
-        Column { name: self.name.into(), help: self.help.into(), best: self.best }
+        Column {
+            name: self.name.into(),
+            help: self.help.into(),
+            best: self.best.filter(|_| self.marked),
+        }
     }
 }
 
@@ -70,10 +78,15 @@ const fn measure(
     unit: Unit,
     of: fn(&Figures) -> Option<f64>,
 ) -> Measure {
-    Measure { key, name, help, best, unit, of, peer: None }
+    Measure { key, name, help, best, marked: true, unit, of, peer: None }
 }
 
 impl Measure {
+    const fn unmarked(mut self) -> Self {
+        self.marked = false;
+        self
+    }
+
     const fn with_peer(mut self, of: fn(&Peer) -> f64) -> Self {
         self.peer = Some(of);
         self
@@ -116,9 +129,9 @@ static MEASURES: [Measure; 61] = [
     measure("density", "density in ROI, %", "share of the true pixels inside the ROI that have a disparity", HIGH, Unit::Percent(1), |f| Some(f.in_roi()?.density)),
     measure("filled_d1", "filled D1 in ROI, %", "D1 over all true pixels inside the ROI, occluded ones too, after filling every hole", LOW, Unit::Percent(2), |f| Some(f.filled_roi?.d1)),
     // Disparity over the whole frame.
-    measure("frame_epe", "EPE, px", "mean error of disparity, whole frame, not occluded", LOW, Unit::Plain(2), |f| Some(f.frame?.epe_px)).with_peer(|p| p.epe_px),
-    measure("frame_d1", "D1, %", "errors above 3 px and 5 %, whole frame, not occluded", LOW, Unit::Percent(2), |f| Some(f.frame?.d1)).with_peer(|p| p.d1),
-    measure("frame_bad_2", "bad-2, %", "errors above 2 px, whole frame, not occluded", LOW, Unit::Percent(2), |f| Some(f.frame?.bad_2)).with_peer(|p| p.bad_2),
+    measure("frame_epe", "EPE, px", "mean error of disparity, whole frame, not occluded", LOW, Unit::Plain(2), |f| Some(f.frame?.epe_px)).with_peer(|p| p.epe_px).unmarked(),
+    measure("frame_d1", "D1, %", "errors above 3 px and 5 %, whole frame, not occluded", LOW, Unit::Percent(2), |f| Some(f.frame?.d1)).with_peer(|p| p.d1).unmarked(),
+    measure("frame_bad_2", "bad-2, %", "errors above 2 px, whole frame, not occluded", LOW, Unit::Percent(2), |f| Some(f.frame?.bad_2)).with_peer(|p| p.bad_2).unmarked(),
     measure("frame_density", "density, %", "share of all true pixels that have a disparity", HIGH, Unit::Percent(1), |f| Some(f.frame?.density)).with_peer(|p| p.density),
     measure("frame_filled_d1", "filled D1, %", "D1 over all true pixels, occluded ones too, after filling every hole", LOW, Unit::Percent(2), |f| Some(f.filled_frame?.d1)).with_peer(|p| p.filled_d1),
     measure("ause", "AUSE", "area between the sparsification curves of confidence and of the true error: 0 is perfect", LOW, Unit::Share, |f| Some(f.sparsification.as_ref()?.ause)),
@@ -139,7 +152,7 @@ static MEASURES: [Measure; 61] = [
     measure("p95_ms", "p95", "95th percentile of ms per frame, all stages", LOW, Unit::Plain(1), |f| Some(f.times?.total.p95)),
     measure("p99_ms", "p99", "99th percentile of ms per frame, all stages", LOW, Unit::Plain(1), |f| Some(f.times?.total.p99)),
     measure("hz", "Hz", "frames per second at the median", HIGH, Unit::Plain(1), |f| Some(1000.0 / f.times?.total.p50)),
-    measure("matching_ms", "matching, ms", "median ms of coarse + stereo + refine", LOW, Unit::Plain(1), |f| Some(f.times?.matching)).with_peer(|p| p.matching_ms),
+    measure("matching_ms", "matching, ms", "median ms of coarse + stereo + refine", LOW, Unit::Plain(1), |f| Some(f.times?.matching).filter(|ms| *ms > 0.0)).with_peer(|p| p.matching_ms),
     measure("saved_total", "saved in total, %", "how much less time a frame takes than with the full-frame baseline", HIGH, Unit::Percent(1), |f| f.saved_total),
     measure("saved_matching", "saved in matching, %", "how much less time coarse + stereo + refine take than with the full-frame baseline", HIGH, Unit::Percent(1), |f| f.saved_matching),
     // The fourth check.

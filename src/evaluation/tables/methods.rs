@@ -1,6 +1,7 @@
 //! Table III: the methods side by side.
 
 use super::{build, measures};
+use crate::evaluation::figures::Figures;
 use crate::evaluation::group::Group;
 use crate::table::Table;
 
@@ -53,26 +54,31 @@ const REGIONS: [&str; 5] = ["region_f1_30", "region_f1_50", "region_f1_75", "dis
 /// Table III in its parts, as far as there is anything to show.
 pub fn tables(group: &Group) -> Vec<Table> {
     let rows = group.compared();
-    let table = |title, keys: &[&str]| build(title, group, &rows, &[], &measures(keys));
-    let mut stereo =
-        build("Table III-b, disparity", group, &rows, &group.peers, &measures(&STEREO));
-    if let Some(table) = stereo.as_mut().filter(|_| rows.iter().any(|m| m.figures.frame.is_some()))
-    {
-        table.notes.push(
-            "Columns without “in ROI” are over the whole frame: there a method that matches less has less density.".into(),
-        );
-    }
-    let mut attention = table("Table III-a, attention", &ATTENTION);
     // Time alone is the business of Table IV.
-    let has_truth = rows.iter().any(|m| m.figures.salient.is_some() || m.figures.map.is_some());
-    if !has_truth {
-        attention = None;
-    }
+    let any = |has: fn(&Figures) -> bool| rows.iter().any(|merged| has(&merged.figures));
+    let table = |title, keys: &[&str]| build(title, group, &rows, &[], &measures(keys));
     let tables = [
-        attention,
+        any(|f| f.salient.is_some() || f.map.is_some())
+            .then(|| table("Table III-a, attention", &ATTENTION))
+            .flatten(),
         table("Table III-a, attention maps stretched to the full range", &STRETCHED),
-        stereo,
+        (any(|f| f.frame.is_some() || f.in_roi().is_some()) || !group.peers.is_empty())
+            .then(|| disparity(group))
+            .flatten(),
         table("Table III-c, regions", &REGIONS),
     ];
     tables.into_iter().flatten().collect()
+}
+
+fn disparity(group: &Group) -> Option<Table> {
+    let mut rows = group.compared();
+    rows.extend(&group.same_pairs);
+    let mut table =
+        build("Table III-b, disparity", group, &rows, &group.peers, &measures(&STEREO))?;
+    if rows.iter().any(|merged| merged.figures.frame.is_some()) {
+        table.notes.push(
+            "Columns without “in ROI” are over the whole frame: there a method that matches less has less density, and its errors are those of fewer pixels.".into(),
+        );
+    }
+    Some(table)
 }

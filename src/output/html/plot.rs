@@ -6,31 +6,75 @@ use super::text::escape;
 /// Side of the plot's own coordinates.
 const SIDE: f64 = 1000.0;
 
-/// A plot over frame numbers.
+/// One axis of a plot, from 0.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis {
+    max: f64,
+    unit: &'static str,
+    /// What is written where the value is 0.
+    first: f64,
+    /// Least distance of two ticks.
+    least_step: f64,
+    /// Most distances of ticks.
+    parts: f64,
+}
+
+impl Axis {
+    /// Numbers of frames, counted from 1 for people.
+    pub fn frames(frames: u64) -> Self {
+        let max = frames.saturating_sub(1).max(1) as f64;
+        Self { max, unit: "", first: 1.0, least_step: 1.0, parts: 6.0 }
+    }
+
+    /// Values from 0 to `max` in `unit`.
+    pub const fn exactly(max: f64, unit: &'static str) -> Self {
+        let max = if max.is_finite() && max > 0.0 { max } else { 1.0 };
+        Self { max, unit, first: 0.0, least_step: 0.0, parts: 5.0 }
+    }
+
+    /// Values from 0 to `max` (made round) in `unit`.
+    pub fn up_to(max: f64, unit: &'static str) -> Self {
+        let exact = Self::exactly(max, unit);
+        let parts = 4.0;
+        let step = round_step(exact.max, parts);
+        Self { max: (exact.max / step - 1e-9).ceil() * step, parts, ..exact }
+    }
+
+    /// Round values with what is written there; the unit stands at the last one.
+    fn ticks(&self) -> Vec<(f64, String)> {
+        let step = round_step(self.max, self.parts).max(self.least_step);
+        let decimals = (-step.log10().floor()).clamp(0.0, 6.0) as usize;
+        let last = (self.max / step + 1e-6) as usize;
+        let text = |value: f64| format!("{:.decimals$}", value + self.first);
+        (0..=last)
+            .map(|i| (i as f64 * step, if i == last { self.unit } else { "" }))
+            .map(|(value, unit)| (value, text(value) + unit))
+            .collect()
+    }
+}
+
+/// A plot of curves over a common axis.
 #[derive(Debug)]
 pub struct Plot {
-    x_max: f64,
-    y_max: f64,
-    unit: &'static str,
+    x: Axis,
+    y: Axis,
+    /// Over frames: has a cursor that the viewer moves.
+    seek: bool,
     class: &'static str,
     paths: String,
     labels: String,
 }
 
 impl Plot {
+    /// An empty plot.
+    pub const fn new(x: Axis, y: Axis) -> Self {
+        Self { x, y, seek: false, class: "", paths: String::new(), labels: String::new() }
+    }
+
     /// A plot for `frames` frames and values from 0 to `y_max` (made round)
-    /// in `unit`.
-    pub fn new(frames: u64, y_max: f64, unit: &'static str) -> Self {
-        let y_max = if y_max.is_finite() && y_max > 0.0 { y_max } else { 1.0 };
-        let step = round_step(y_max, 4.0);
-        Self {
-            x_max: frames.saturating_sub(1).max(1) as f64,
-            y_max: (y_max / step - 1e-9).ceil() * step,
-            unit,
-            class: "",
-            paths: String::new(),
-            labels: String::new(),
-        }
+    /// in `unit`, with a cursor that the viewer moves.
+    pub fn over_frames(frames: u64, y_max: f64, unit: &'static str) -> Self {
+        Self { seek: true, ..Self::new(Axis::frames(frames), Axis::up_to(y_max, unit)) }
     }
 
     /// The same plot with one more CSS class.
@@ -41,11 +85,24 @@ impl Plot {
     }
 
     fn x(&self, x: f64) -> f64 {
-        x / self.x_max * SIDE
+        x.clamp(0.0, self.x.max) / self.x.max * SIDE
     }
 
     fn y(&self, y: f64) -> f64 {
-        SIDE - y.clamp(0.0, self.y_max) / self.y_max * SIDE
+        SIDE - y.clamp(0.0, self.y.max) / self.y.max * SIDE
+    }
+
+    /// A line through all of `points`.
+    pub fn curve(&mut self, points: &[(f64, f64)], color: &str) {
+        self.line(points, f64::INFINITY, color);
+    }
+
+    /// The same, dashed.
+    pub fn dashed_curve(&mut self, points: &[(f64, f64)], color: &str) {
+        let path = self.run(points);
+        self.paths.push_str(&format!(
+            "<path class=\"line dashed\" style=\"stroke:{color}\" d=\"{path}\"/>"
+        ));
     }
 
     /// A line through `points`, broken where the distance in x is more than
@@ -114,34 +171,26 @@ impl Plot {
         format!("M{}", coordinates.join("L"))
     }
 
-    /// The plot as HTML, with a cursor that the viewer moves.
+    /// The plot as HTML.
     pub fn html(&self) -> String {
         let mut grid = String::new();
         let mut ticks = String::new();
-        let step = round_step(self.y_max, 4.0);
-        let decimals = (-step.log10().floor()).clamp(0.0, 6.0) as usize;
-        for i in 0..=(self.y_max / step + 0.5) as usize {
-            let value = i as f64 * step;
+        for (value, text) in self.y.ticks() {
             let y = self.y(value);
             grid.push_str(&format!("M0 {y:.1}H{SIDE}"));
             let bottom = 100.0 - y / SIDE * 100.0;
-            let last = (i + 1) as f64 * step > self.y_max + step * 0.5;
-            let unit = if last { self.unit } else { "" };
             ticks.push_str(&format!(
-                "<span class=\"yt\" style=\"bottom:{bottom:.2}%\">{value:.decimals$}{unit}</span>"
+                "<span class=\"yt\" style=\"bottom:{bottom:.2}%\">{text}</span>"
             ));
         }
-        let step = round_step(self.x_max, 6.0).max(1.0);
-        for i in 0..=(self.x_max / step) as usize {
-            let frame = i as f64 * step;
-            let left = frame / self.x_max * 100.0;
-            ticks.push_str(&format!(
-                "<span class=\"xt\" style=\"left:{left:.2}%\">{:.0}</span>",
-                frame + 1.0
-            ));
+        for (value, text) in self.x.ticks() {
+            let left = self.x(value) / SIDE * 100.0;
+            ticks.push_str(&format!("<span class=\"xt\" style=\"left:{left:.2}%\">{text}</span>"));
         }
+        let (seek, cursor) =
+            if self.seek { ("seek ", "<div class=\"now\"></div>") } else { ("", "") };
         format!(
-            "<div class=\"plot seek {}\"><svg viewBox=\"0 0 {SIDE} {SIDE}\" preserveAspectRatio=\"none\" aria-hidden=\"true\"><path class=\"grid\" d=\"{grid}\"/>{}</svg>{ticks}{}<div class=\"now\"></div></div>",
+            "<div class=\"plot {seek}{}\"><svg viewBox=\"0 0 {SIDE} {SIDE}\" preserveAspectRatio=\"none\" aria-hidden=\"true\"><path class=\"grid\" d=\"{grid}\"/>{}</svg>{ticks}{}{cursor}</div>",
             self.class, self.paths, self.labels
         )
     }
@@ -174,15 +223,34 @@ mod tests {
 
     #[test]
     fn lines_break_at_gaps_and_lone_points_are_dots() {
-        let mut plot = Plot::new(11, 10.0, "m");
+        let mut plot = Plot::over_frames(11, 10.0, "m");
         plot.line(&[(0.0, 1.0), (1.0, 2.0), (5.0, 3.0), (9.0, 4.0), (10.0, 5.0)], 2.0, "red");
         assert_eq!(plot.paths.matches('M').count(), 3);
         assert_eq!(plot.paths.matches("h0").count(), 1);
     }
 
     #[test]
+    fn ticks_are_round_and_the_last_one_has_the_unit() {
+        let texts = |axis: Axis| -> Vec<String> {
+            axis.ticks().into_iter().map(|(_, text)| text).collect()
+        };
+        assert_eq!(texts(Axis::up_to(0.9, " px")), ["0.0", "0.5", "1.0 px"]);
+        assert_eq!(texts(Axis::exactly(0.9, "")), ["0.0", "0.2", "0.4", "0.6", "0.8"]);
+        assert_eq!(texts(Axis::frames(3)), ["1", "2", "3"]);
+        assert_eq!(Axis::exactly(192.0, "").ticks().last().unwrap().0, 150.0);
+    }
+
+    #[test]
+    fn curves_that_go_back_are_not_broken_when_dashed() {
+        let mut plot = Plot::new(Axis::exactly(1.0, ""), Axis::exactly(1.0, ""));
+        plot.dashed_curve(&[(0.0, 1.0), (0.5, 2.0), (0.2, 0.0)], "red");
+        assert_eq!(plot.paths.matches('M').count(), 1);
+        assert!(!plot.html().contains("seek") && !plot.html().contains("now"));
+    }
+
+    #[test]
     fn no_value_and_no_frame_still_make_a_plot() {
-        let plot = Plot::new(0, f64::NAN, "");
+        let plot = Plot::over_frames(0, f64::NAN, "");
         assert!(!plot.html().contains("NaN") && !plot.html().contains("inf"));
     }
 }

@@ -7,43 +7,35 @@ use serde_json::Value;
 
 use super::{ReportSink, frames, scores, timing};
 use crate::config::{Config, SaliencyMode};
+use crate::output::html::page::{self, Page};
 use crate::output::html::plot::Plot;
+use crate::output::html::template;
 use crate::output::html::text::{count, escape, hex, metres, ms, or_dash, percent, utc};
 use crate::output::picture::track_color;
 
-const PAGE: &str = include_str!("page.html");
+const BODY: &str = include_str!("page.html");
 const VIEWER: &str = include_str!("viewer.html");
-const STYLE: &str = include_str!("style.css");
+const STYLE: &str = include_str!("viewer.css");
 const SCRIPT: &str = include_str!("viewer.js");
 
 /// Writes the whole page.
-pub fn write(report: &ReportSink, out: &mut impl Write) -> io::Result<()> {
-    let mut rest = PAGE;
-    while let Some((before, name, after)) = next_slot(rest) {
-        out.write_all(before.as_bytes())?;
-        if name == "frames" {
-            frames::write(report, out)?;
-        } else {
-            out.write_all(fill(report, name).as_bytes())?;
-        }
-        rest = after;
-    }
-    out.write_all(rest.as_bytes())
-}
-
-/// The text before the next `{{name}}`, the name, and the text after it.
-fn next_slot(text: &str) -> Option<(&str, &str, &str)> {
-    let (before, rest) = text.split_once("{{")?;
-    let (name, after) = rest.split_once("}}")?;
-    Some((before, name, after))
+pub fn write<W: Write>(report: &ReportSink, out: &mut W) -> io::Result<()> {
+    let page = Page {
+        title: title(&report.facts.source),
+        kicker: &report.facts.command,
+        style: STYLE,
+        scripts: true,
+    };
+    page::write(&page, out, |out| {
+        template::write(BODY, out, |slot, out| match slot {
+            "frames" => frames::write(report, out),
+            _ => out.write_all(fill(report, slot).as_bytes()),
+        })
+    })
 }
 
 fn fill(report: &ReportSink, name: &str) -> String {
     match name {
-        "version" => env!("CARGO_PKG_VERSION").to_owned(),
-        "title" => escape(title(&report.facts.source)),
-        "command" => escape(&report.facts.command),
-        "style" => STYLE.to_owned(),
         "script" => SCRIPT.to_owned(),
         "facts" => facts(report),
         "notice" => notice(report),
@@ -175,7 +167,7 @@ fn tracks(report: &ReportSink) -> String {
         return String::new();
     }
     let farthest = lines.values().flatten().map(|point| point.1).fold(0.0, f64::max);
-    let mut plot = Plot::new(report.totals.frames, farthest, " m").with_class("tracks");
+    let mut plot = Plot::over_frames(report.totals.frames, farthest, " m").with_class("tracks");
     let gap = report.rows.stride() as f64 * 3.5;
     for (id, points) in &lines {
         plot.line(points, gap, &hex(track_color(*id)));

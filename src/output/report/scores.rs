@@ -129,7 +129,7 @@ fn plots(report: &ReportSink) -> String {
             continue;
         }
         let highest = points.iter().map(|point| point.1).fold(top, f64::max);
-        let mut plot = Plot::new(frames, highest, unit).with_class("low");
+        let mut plot = Plot::over_frames(frames, highest, unit).with_class("low");
         plot.line(&points, gap, color);
         out += &format!(
             "<div><div class=\"plothead\"><b>{title}</b><span>{note}</span></div>{}</div>",

@@ -60,7 +60,7 @@ fn plot(stats: &StageStats, total: Percentiles) -> (String, usize) {
     // One slow start must not flatten everything else.
     let highest = columns.iter().map(|(_, times)| times.total()).fold(0.0, f64::max);
     let top = highest.min(total.p95 * 2.5);
-    let mut plot = Plot::new(stats.frames(), top, " ms").with_class("high");
+    let mut plot = Plot::over_frames(stats.frames(), top, " ms").with_class("high");
     let x: Vec<f64> = columns.iter().map(|(x, _)| *x).collect();
     let mut low = vec![0.0; columns.len()];
     for stage in Stage::ALL {
