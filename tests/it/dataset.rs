@@ -1,6 +1,9 @@
 //! Data sets in their published layouts, and their export as bags.
 
 mod kitti;
+mod masks;
+mod middlebury;
+mod rendered;
 
 use std::fs;
 use std::path::{Path, PathBuf};

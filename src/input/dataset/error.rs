@@ -37,6 +37,12 @@ pub enum DatasetError {
         /// Names of those there are.
         available: String,
     },
+    /// A split of a data set that has none.
+    #[error("only DAVIS has splits: there is no '@{split}' here")]
+    NoSplit {
+        /// As asked for, without the `@`.
+        split: String,
+    },
     /// A calibration file that says something else than it should.
     #[error("calibration {path}: {fault}")]
     CalibrationFile {

@@ -3,6 +3,8 @@
 pub mod disparity;
 pub mod flo;
 pub mod flow;
+pub mod hdf5;
+pub mod indexed;
 pub mod mask;
 pub mod objects;
 pub mod pfm;
@@ -56,6 +58,13 @@ pub fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
     reader.decode().map_err(|e| fault(path, &e.to_string()))
+}
+
+/// Width and height of an image file, from its header.
+pub fn dimensions(path: &Path) -> Result<(u32, u32), DatasetError> {
+    let io = |source| DatasetError::Io { path: path.to_owned(), source };
+    let reader = ImageReader::open(path).map_err(io)?.with_guessed_format().map_err(io)?;
+    reader.into_dimensions().map_err(|e| fault(path, &e.to_string()))
 }
 
 /// The content of a file of limited length.

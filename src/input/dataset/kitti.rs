@@ -13,9 +13,9 @@
 //! truth, the multi-view extension has 21 of them at 10 Hz.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::folder::{files, missing, optional, present, text};
 use super::{
     Calibration, DatasetError, DisparityCoding, DisparityFile, FlowCoding, FlowFile, FrameFiles,
     Layout, ObjectCoding, ObjectFile, Scene, TruthFiles,
@@ -93,11 +93,8 @@ impl Kitti {
     /// Scenes with their frame numbers, from the names of the left images.
     fn list(root: PathBuf, folders: &'static Folders) -> Result<Self, DatasetError> {
         let folder = root.join(folders.left);
-        let io = |source| DatasetError::Io { path: folder.clone(), source };
         let mut scenes: BTreeMap<String, Vec<u32>> = BTreeMap::new();
-        for entry in fs::read_dir(&folder).map_err(io)? {
-            let name = entry.map_err(io)?.file_name();
-            let name = name.to_string_lossy();
+        for name in files(&folder)? {
             let parts = name.strip_suffix(".png").and_then(|stem| stem.split_once('_'));
             let Some((scene, number)) = parts else { continue };
             if scene.bytes().all(|b| b.is_ascii_digit())
@@ -108,10 +105,8 @@ impl Kitti {
             }
         }
         if scenes.is_empty() {
-            return Err(DatasetError::Missing {
-                path: folder.join("NNNNNN_10.png"),
-                needed: "the folder holds no image of KITTI's naming".to_owned(),
-            });
+            let path = folder.join("NNNNNN_10.png");
+            return Err(missing(&path, "the folder holds no image of KITTI's naming"));
         }
         for numbers in scenes.values_mut() {
             numbers.sort_unstable();
@@ -122,10 +117,7 @@ impl Kitti {
 
     /// The truth of a frame, as far as it is there.
     fn truth(&self, file: &str) -> TruthFiles {
-        let present = |folder: &str| {
-            let path = self.root.join(folder).join(file);
-            path.is_file().then_some(path)
-        };
+        let present = |folder: &str| optional(self.root.join(folder).join(file));
         let disparity = |folder: &str| {
             let coding = DisparityCoding::Fixed16;
             present(folder).map(|path| DisparityFile { path, coding, masks: Vec::new() })
@@ -154,14 +146,14 @@ impl Layout for Kitti {
     fn scene(&self, index: usize) -> Result<Scene, DatasetError> {
         let (name, root, folders) = (self.names[index].clone(), &self.root, self.folders);
         let calibration_path = root.join(folders.calibration).join(format!("{name}.txt"));
-        present(&calibration_path, "the calibration of the scene")?;
+        present(&calibration_path, "the calibration of the scene in KITTI's published layout")?;
         let calibration = calibration(&calibration_path, folders.matrices)?;
         let frames: Result<Vec<FrameFiles>, DatasetError> = self.numbers[index]
             .iter()
             .map(|&number| {
                 let file = format!("{name}_{number:02}.png");
                 let right = root.join(folders.right).join(&file);
-                present(&right, "the right image of the frame")?;
+                present(&right, "the right image of the frame in KITTI's published layout")?;
                 let mut frame =
                     FrameFiles::pair(root.join(folders.left).join(&file), right, number);
                 if number == TRUTH_FRAME {
@@ -187,26 +179,15 @@ impl Layout for Kitti {
 fn root(path: &Path, folders: &Folders) -> Result<PathBuf, DatasetError> {
     let candidates = [path.to_owned(), path.join("training"), path.join("testing")];
     candidates.into_iter().find(|root| root.join(folders.left).is_dir()).ok_or_else(|| {
-        DatasetError::Missing {
-            path: path.join("training").join(folders.left),
-            needed: "the left images of KITTI's published layout".to_owned(),
-        }
+        let path = path.join("training").join(folders.left);
+        missing(&path, "the left images of KITTI's published layout")
     })
-}
-
-fn present(path: &Path, needed: &str) -> Result<(), DatasetError> {
-    if path.is_file() {
-        return Ok(());
-    }
-    let needed = format!("{needed} in KITTI's published layout");
-    Err(DatasetError::Missing { path: path.to_owned(), needed })
 }
 
 /// Focal length, principal points and baseline from two projection matrices:
 /// lines `NAME: ` and twelve numbers, row by row.
 fn calibration(path: &Path, names: [&str; 2]) -> Result<Calibration, DatasetError> {
-    let text = fs::read_to_string(path)
-        .map_err(|source| DatasetError::Io { path: path.to_owned(), source })?;
+    let text = text(path)?;
     let fault = |fault: String| DatasetError::CalibrationFile { path: path.to_owned(), fault };
     let matrix = |name: &str| -> Result<[f64; 12], DatasetError> {
         let line = text

@@ -19,6 +19,10 @@ pub enum DisparityCoding {
     },
     /// PFM with one channel; infinite is unknown (Middlebury since 2014).
     Pfm,
+    /// 8-bit RGB PNG: `4 R + G / 64 + B / 16384` (Sintel).
+    Sintel,
+    /// HDF5 at twice the resolution of the image; NaN is unknown (Spring).
+    Spring,
 }
 
 /// How a file holds motion `[dx, dy]` in pixels.
@@ -28,6 +32,8 @@ pub enum FlowCoding {
     Fixed16,
     /// `.flo`, unknown beyond 1e9 (Middlebury, Sintel).
     Flo,
+    /// HDF5 at twice the resolution of the image; NaN is unknown (Spring).
+    Spring,
 }
 
 /// How a file holds objects.
@@ -35,6 +41,9 @@ pub enum FlowCoding {
 pub enum ObjectCoding {
     /// The value of a gray pixel is the id (`obj_map` of KITTI 2015).
     Ids,
+    /// The index of a palette pixel is the id, 255 belongs to none; in a gray
+    /// image 255 is object 1 and any other value the id (DAVIS).
+    Indexed,
     /// One object where a gray value is 128 or more.
     Mask,
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use image::DynamicImage;
 
 use super::super::{DatasetError, FlowCoding};
-use super::{decode, fault, flo, no_pixels, size_of};
+use super::{decode, fault, flo, hdf5, no_pixels, size_of};
 use crate::image::Image;
 
 /// The motion `[dx, dy]` in pixels that a file holds, NaN where unknown.
@@ -16,6 +16,7 @@ pub fn read(path: &Path, coding: FlowCoding) -> Result<Image<[f32; 2]>, DatasetE
     match coding {
         FlowCoding::Fixed16 => fixed16(path),
         FlowCoding::Flo => flo::read(path),
+        FlowCoding::Spring => hdf5::every_second(path, "flow"),
     }
 }
 

@@ -5,11 +5,15 @@ use std::path::Path;
 use image::DynamicImage;
 
 use super::super::{DatasetError, ObjectCoding};
-use super::{decode, gray, no_pixels, size_of};
+use super::{decode, gray, indexed, no_pixels, size_of};
 use crate::image::Image;
 
 /// Gray value from which a pixel of a mask belongs to the object.
 const THRESHOLD: u8 = 128;
+
+/// Index of what belongs to no object and no background in DAVIS 2017 (its
+/// evaluation takes it for background), and the gray of the one object of 2016.
+const WHITE: u8 = 255;
 
 /// The object ids that a file holds, 0 is background.
 ///
@@ -18,6 +22,17 @@ const THRESHOLD: u8 = 128;
 pub fn read(path: &Path, coding: ObjectCoding) -> Result<Image<u16>, DatasetError> {
     match coding {
         ObjectCoding::Ids => ids(path),
+        ObjectCoding::Indexed => {
+            if let Some(indices) = indexed::read(path)? {
+                return widened(
+                    path,
+                    &indices,
+                    |index| if index == WHITE { 0 } else { index.into() },
+                );
+            }
+            let values = gray(path, decode(path)?)?;
+            widened(path, &values, |value| if value == WHITE { 1 } else { value.into() })
+        }
         ObjectCoding::Mask => {
             let values = gray(path, decode(path)?)?;
             widened(path, &values, |value| u16::from(value >= THRESHOLD))
