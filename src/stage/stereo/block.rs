@@ -21,10 +21,11 @@ pub const RADIUS: usize = 4;
 /// Columns of a tile with the blocks' overhang, in whole vectors.
 const WIDE: usize = 3 * LANES;
 
-/// Sum of a block to a byte: 8 times the mean cost, 0..=248.
+/// Sum of a block to a byte: 8 times the mean cost, at most 255.
 const fn to_byte(sum: u16) -> u8 {
     const AREA: u32 = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as u32;
-    ((sum as u32 * 8 + AREA / 2) / AREA) as u8
+    let mean = (sum as u32 * 8 + AREA / 2) / AREA;
+    if mean > 255 { 255 } else { mean as u8 }
 }
 
 /// Fills the rows of `volume` with the mean cost of the block around each

@@ -1,5 +1,4 @@
-//! The census transform: which pixels of a window are brighter than their
-//! mirror image about its centre.
+//! The census transform: which pixels of a window are brighter than its centre.
 
 use crate::image::Image;
 use crate::simd::prelude::*;
@@ -13,15 +12,20 @@ pub const REACH_Y: usize = 3;
 /// Byte planes of a descriptor.
 pub const PLANES: usize = 4;
 
-/// Offsets (dx, dy) of the 9x7 window's upper half in reading order: bit k is
-/// set where the pixel at `+offset` is brighter than that at `-offset` (the
-/// centre-symmetric census). 31 pairs make up the window; bit 31 stays clear.
-pub const OFFSETS: [(isize, isize); 31] = {
-    let mut offsets = [(0, 0); 31];
-    let mut k = 0;
-    while k < 31 {
-        offsets[k] = (k as isize % 9 - 4, k as isize / 9 - 3);
-        k += 1;
+/// Offsets (dx, dy) of the 9x7 window's pixels in reading order: bit k is set
+/// where the pixel at offset k is brighter than the centre (Zabih and Woodfill
+/// 1994). Of the window, seen as a chessboard, the 32 squares are taken whose
+/// colour is not that of the centre: they fill four bytes.
+pub const OFFSETS: [(isize, isize); 32] = {
+    let mut offsets = [(0, 0); 32];
+    let (mut k, mut i) = (0, 0);
+    while k < 32 {
+        let (dx, dy) = (i % 9 - 4, i / 9 - 3);
+        if (dx + dy) % 2 != 0 {
+            offsets[k] = (dx, dy);
+            k += 1;
+        }
+        i += 1;
     }
     offsets
 };
@@ -62,14 +66,14 @@ impl Census {
         for (i, planes) in self.planes.chunks_exact_mut(self.stride * PLANES).enumerate() {
             let gray = &self.gray[i * self.gray_stride..(i + 2 * REACH_Y + 1) * self.gray_stride];
             for x in (0..self.stride).step_by(LANES) {
+                let at = REACH_Y * self.gray_stride + LANES + x;
+                let centre = load(simd, gray, at);
                 for plane in 0..PLANES {
                     let mut byte = u8x32::splat(simd, 0);
                     for &(dx, dy) in OFFSETS.iter().skip(plane * 8).take(8).rev() {
-                        let centre = (REACH_Y * self.gray_stride + LANES + x) as isize;
                         let step = dy * self.gray_stride as isize + dx;
-                        let a = load(simd, gray, (centre + step) as usize);
-                        let b = load(simd, gray, (centre - step) as usize);
-                        byte = byte + byte + a.saturating_sub(b).min(1);
+                        let pixel = load(simd, gray, (at as isize + step) as usize);
+                        byte = byte + byte + pixel.saturating_sub(centre).min(1);
                     }
                     store(planes, plane * self.stride + x, byte);
                 }

@@ -4,8 +4,8 @@ use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, load, load_block, u8x32};
 use crate::stage::stereo::census::PLANES;
 
-/// Largest cost of one pixel: all 31 pairs differ.
-pub const MAX_COST: u8 = 31;
+/// Largest cost of one pixel: all 32 bits differ.
+pub const MAX_COST: u8 = 32;
 
 /// One byte of 32 descriptors per plane.
 pub type Descriptors<S> = [u8x32<S>; PLANES];

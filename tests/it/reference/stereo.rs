@@ -14,14 +14,17 @@ use salient_stereo::stage::stereo::{Matches, NO_MATCH};
 
 type Point = (isize, isize);
 
-/// Centre-symmetric census over 9x7 pixels.
+/// Census of every second pixel of 9x7 against the centre.
 pub fn census(image: &Image<u8>, x: isize, y: isize) -> u32 {
-    let mut bits = 0;
-    for k in 0..31 {
-        let (dx, dy) = (k % 9 - 4, k / 9 - 3);
-        let a = image.get_clamped(x + dx, y + dy);
-        let b = image.get_clamped(x - dx, y - dy);
-        bits |= u32::from(a > b) << k;
+    let (mut bits, mut k) = (0, 0);
+    for dy in -3..=3 {
+        for dx in -4..=4 {
+            if (dx + dy) % 2 != 0 {
+                let brighter = image.get_clamped(x + dx, y + dy) > image.get_clamped(x, y);
+                bits |= u32::from(brighter) << k;
+                k += 1;
+            }
+        }
     }
     bits
 }
@@ -233,7 +236,7 @@ impl<'a> Domain<'a> {
             }
         }
         let area = (2 * RADIUS as u32 + 1).pow(2);
-        ((8 * sum + area / 2) / area) as u8
+        ((8 * sum + area / 2) / area).min(255) as u8
     }
 }
 
