@@ -80,16 +80,22 @@ impl VideoStats {
             mean(&self.videos.iter().filter_map(of).collect::<Vec<_>>())
         };
         Some(VideoScore {
-            j_mean: over_videos(&|video| mean(&video.j))?,
-            j_recall: over_videos(&|video| recall(&video.j))?,
-            j_decay: over_videos(&|video| decay(&video.j))?,
-            f_mean: over_videos(&|video| mean(&video.f))?,
-            f_recall: over_videos(&|video| recall(&video.f))?,
-            f_decay: over_videos(&|video| decay(&video.f))?,
+            j_mean: over_videos(&|video| mean(inner(&video.j)))?,
+            j_recall: over_videos(&|video| recall(inner(&video.j)))?,
+            j_decay: over_videos(&|video| decay(inner(&video.j)))?,
+            f_mean: over_videos(&|video| mean(inner(&video.f)))?,
+            f_recall: over_videos(&|video| recall(inner(&video.f)))?,
+            f_decay: over_videos(&|video| decay(inner(&video.f)))?,
             warped_iou: self.warped.value(),
             true_warped_iou: self.true_warped.value(),
         })
     }
+}
+
+/// Without the first and the last frame, which the benchmark leaves out; all
+/// of a video too short for that.
+fn inner(values: &[f64]) -> &[f64] {
+    if values.len() > 2 { &values[1..values.len() - 1] } else { values }
 }
 
 fn mean(values: &[f64]) -> Option<f64> {

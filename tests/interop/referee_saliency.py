@@ -4,8 +4,8 @@
     pip install -r tests/interop/requirements.txt
     python tests/interop/referee_saliency.py MAPS_DIR MASKS_DIR [SCORES.json]
 
-Both folders hold gray PNGs of equal names (in subfolders as well); masks are non-zero where salient, and images
-without a salient pixel are left out. SCORES.json is an object with `as_is` (value / 255) and `stretched` (each map
+Both folders hold gray PNGs of equal names (in subfolders as well); masks are salient above 128, as pysodmetrics takes
+them, and images without a salient pixel are left out. SCORES.json is an object with `as_is` (value / 255) and `stretched` (each map
 stretched to 0..1 first) as the metrics print them, and with `each`, where the same may stand for single images
 by name; without it the figures are printed as a table.
 Exit code 0: every number agrees to 1e-4.
@@ -63,7 +63,7 @@ def referee(pairs, stretch):
     weighted, s, e, mae = py_sod_metrics.WeightedFmeasure(), Smeasure(), Emeasure(), py_sod_metrics.MAE()
     curves, holding = [], {90: [], 95: []}
     for image, mask in pairs:
-        values, salient = image / 255, mask != 0
+        values, salient = image / 255, mask > 128
         if stretch and values.max() != values.min():
             values = (values - values.min()) / (values.max() - values.min())
         for metric in (f, weighted, s, e, mae):
@@ -121,7 +121,7 @@ def read(maps, masks):
             sys.exit(f"{name}: no readable mask and map of this name")
         if images[0].shape != images[1].shape:
             sys.exit(f"{name}: the map is {images[0].shape}, the mask {images[1].shape}")
-        if images[1].any():
+        if (images[1] > 128).any():
             pairs[str(name.with_suffix(""))] = images
     if not pairs:
         sys.exit(f"{maps}: no map whose mask has a salient pixel")

@@ -8,7 +8,8 @@ use super::super::{DatasetError, ObjectCoding};
 use super::{decode, gray, indexed, no_pixels, size_of};
 use crate::image::Image;
 
-/// Gray value from which a pixel of a mask belongs to the object.
+/// Gray value above which a pixel of a mask belongs to the object, as the
+/// field's evaluation programs take it.
 const THRESHOLD: u8 = 128;
 
 /// Index of what belongs to no object and no background in DAVIS 2017 (its
@@ -35,7 +36,7 @@ pub fn read(path: &Path, coding: ObjectCoding) -> Result<Image<u16>, DatasetErro
         }
         ObjectCoding::Mask => {
             let values = gray(path, decode(path)?)?;
-            widened(path, &values, |value| u16::from(value >= THRESHOLD))
+            widened(path, &values, |value| u16::from(value > THRESHOLD))
         }
     }
 }
