@@ -6,8 +6,8 @@
     python benches/peers/stereo.py KITTI_FOLDER --scene 000027 --tool target/release/salient_stereo
 
 KITTI_FOLDER holds training/image_0, image_1 (or colour image_2, image_3), disp_noc and disp_occ
-(disp_noc_0 and disp_occ_0 in the 2015 layout). A Middlebury folder (im0.png, im1.png, disp0GT.pfm,
-mask0nocc.png) is taken as it is.
+(disp_noc_0 and disp_occ_0 in the 2015 layout). Middlebury scene folders of 2001 to 2021 are taken as they are.
+Without --bag and --tool only OpenCV is measured, and --json writes its rows for `salient_stereo evaluate --peers`.
 
 With --bag our disparity is read from an output bag of `salient_stereo replay` (topic /disparity) and scored
 where we matched; with --tool the script runs the tool itself: `export-bag` and `replay` for the disparity of the
@@ -69,28 +69,65 @@ def read_kitti_disparity(path):
     return image.astype(np.float32) / 256
 
 
+def gray(path):
+    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        sys.exit(f"{path}: cannot be read as an image")
+    return image
+
+
 class Scene:
     """One pair with its truth: `noc` and `occ` in px, 0 where unknown."""
 
-    def __init__(self, folder, scene, frame):
+    def __init__(self, folder, scene=None, frame="10"):
         folder = Path(folder)
         self.kitti = None
+        self.dataset, self.scene = "middlebury", folder.name
         if (folder / "im0.png").exists():
             self.left, self.right = folder / "im0.png", folder / "im1.png"
-            self.occ = read_pfm(folder / "disp0GT.pfm")
-            visible = cv2.imread(str(folder / "mask0nocc.png"), cv2.IMREAD_GRAYSCALE)
+            truth = next(p for p in (folder / "disp0GT.pfm", folder / "disp0.pfm") if p.exists())
+            self.occ = read_pfm(truth)
+            visible = gray(folder / "mask0nocc.png")
             self.noc = self.occ * (visible == 255)
-            self.name = folder.name
-            return
-        training = folder / "training" if (folder / "training").is_dir() else folder
-        left, right = ("image_0", "image_1") if (training / "image_0").is_dir() else ("image_2", "image_3")
-        name = f"{scene}_{frame}.png"
-        self.left, self.right = training / left / name, training / right / name
-        suffix = "" if (training / "disp_noc").is_dir() else "_0"
-        self.noc = read_kitti_disparity(training / f"disp_noc{suffix}" / name)
-        self.occ = read_kitti_disparity(training / f"disp_occ{suffix}" / name)
-        self.name = f"{scene}_{frame}"
-        self.kitti = (folder, scene, frame)
+        elif (folder / "imL.png").exists():
+            # Version 2 of the Middlebury evaluation: the scale of the map stands in info.txt.
+            self.left, self.right = folder / "imL.png", folder / "imR.png"
+            scale = self.scale_of(folder)
+            self.occ = gray(folder / "groundtruth.png").astype(np.float32) / scale
+            self.noc = self.occ * (gray(folder / "nonocc.png") == 255)
+        elif (folder / "view1.png").exists():
+            # 2005 and 2006: pixels at full size, so half of that at half size.
+            self.left, self.right = folder / "view1.png", folder / "view5.png"
+            parts = [part.lower() for part in folder.resolve().parts]
+            divisor = 2 if "halfsize" in parts else 3 if "thirdsize" in parts else 1
+            self.occ = gray(folder / "disp1.png").astype(np.float32) / divisor
+            self.noc = self.occ
+        elif any(folder.glob("*GT.png")):
+            truth = next(iter(folder.glob("*GT.png")))
+            stem = truth.name[: -len("GT.png")]
+            self.left, self.right = (next(folder.glob(f"{stem}{side}.*")) for side in "LR")
+            self.occ = gray(truth).astype(np.float32)
+            self.noc = self.occ
+        else:
+            training = folder / "training" if (folder / "training").is_dir() else folder
+            is_2012 = (training / "disp_noc").is_dir()
+            left, right = ("image_0", "image_1") if (training / "image_0").is_dir() else ("image_2", "image_3")
+            name = f"{scene}_{frame}.png"
+            self.left, self.right = training / left / name, training / right / name
+            suffix = "" if is_2012 else "_0"
+            self.noc = read_kitti_disparity(training / f"disp_noc{suffix}" / name)
+            self.occ = read_kitti_disparity(training / f"disp_occ{suffix}" / name)
+            self.dataset, self.scene = "kitti2012" if is_2012 else "kitti2015", scene
+            self.kitti = (folder, scene, frame)
+        self.name = self.left.stem if self.kitti else self.scene
+
+    @staticmethod
+    def scale_of(folder):
+        """Gray levels per pixel: the first number of `info.txt`; the second is the largest disparity."""
+        info = folder / "info.txt"
+        if not info.exists():
+            sys.exit(f"{info} is missing: the scale of the 8-bit disparities")
+        return float(info.read_text().split()[0])
 
     def position(self):
         """Number of this pair among those of its scene, which is its number in a bag of the scene."""
@@ -98,6 +135,17 @@ class Scene:
             return 0
         _, name, _ = self.kitti
         return sorted(p.stem for p in self.left.parent.glob(f"{name}_*.png")).index(self.name)
+
+
+def scenes_of(folder, wanted, frame):
+    """The scenes of a KITTI folder, or the one that a Middlebury folder is."""
+    folder = Path(folder)
+    training = folder / "training" if (folder / "training").is_dir() else folder
+    for truth in (training / "disp_noc", training / "disp_noc_0"):
+        if truth.is_dir():
+            names = wanted or sorted(p.stem.split("_")[0] for p in truth.glob(f"*_{frame}.png"))
+            return [Scene(folder, name, frame) for name in names]
+    return [Scene(folder)]
 
 
 def centred(shape, fraction):
@@ -200,27 +248,9 @@ def bench(tool, scene, fraction, disparities, frames, threads):
     return matching["p50"] if isinstance(matching, dict) else matching
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", help="KITTI 2012/2015 folder, or a Middlebury scene folder")
-    parser.add_argument("--scene", default="000027", help="KITTI scene number")
-    parser.add_argument("--frame", default="10", help="KITTI frame number (the one with truth is 10)")
-    parser.add_argument("--bag", help="output bag of `salient_stereo replay` over the whole scene")
-    parser.add_argument("--bag-frame", type=int, help="number of the pair in the bag (default: found by frame number)")
-    parser.add_argument("--tool", help="salient_stereo executable, to measure accuracy of rectangles and time")
-    parser.add_argument("--roi", type=float, action="append", help="share of the centred rectangle (0.25 and 1)")
-    parser.add_argument("--disparities", type=int, default=192)
-    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds of timing")
-    args = parser.parse_args()
-    if not args.bag and not args.tool:
-        parser.error("give --bag, --tool, or both")
-
-    cv2.setNumThreads(1)
-    scene = Scene(args.folder, args.scene, args.frame)
-    left = cv2.imread(str(scene.left), cv2.IMREAD_GRAYSCALE)
-    right = cv2.imread(str(scene.right), cv2.IMREAD_GRAYSCALE)
-    if left is None or right is None:
-        sys.exit(f"{scene.left} or {scene.right} cannot be read")
+def measure(scene, args, peers):
+    """Prints the tables of one scene and adds the rows of the others to `peers`."""
+    left, right = gray(scene.left), gray(scene.right)
     matchers = opencv_matchers(args.disparities)
     fractions = args.roi or [0.25, 1.0]
     height, width = left.shape
@@ -253,6 +283,16 @@ def main():
             print(f"| salient_stereo, {where}, {threads} thread{plural} | {middle:.2f} | {reference / middle:.1f} |")
     print()
 
+    everywhere = np.ones(left.shape, bool)
+    for name, disparity in found.items():
+        epe, d1, bad, dense = errors(disparity, scene.noc, everywhere)
+        filled_epe, filled_d1, _, _ = errors(filled(disparity), scene.occ, everywhere)
+        known = int((scene.noc > 0).sum())
+        row = {"known": known, "pixels": round(known * dense / 100), "epe_px": epe, "d1": d1 / 100, "bad_2": bad / 100, "density": dense / 100,
+               "filled_epe_px": filled_epe, "filled_d1": filled_d1 / 100, "matching_ms": statistics.median(times[name])}
+        peers.append({"dataset": scene.dataset, "scene": scene.scene, "method": f"OpenCV {name}",
+                      "version": cv2.__version__, **{key: value if isinstance(value, int) else float(value) for key, value in row.items()}})
+
     jobs = []
     if args.bag:
         frame = args.bag_frame
@@ -281,6 +321,31 @@ def main():
             area = sparsification(disparity, confidence, scene.noc, mask)
             print(f"\nConfidence of salient_stereo: AUSE {area:.3f} (0: as good as knowing the error).")
         print()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", nargs="+", help="KITTI 2012/2015 folder, or Middlebury scene folders")
+    parser.add_argument("--scene", action="append", help="KITTI scene number (default: all that have truth)")
+    parser.add_argument("--frame", default="10", help="KITTI frame number (the one with truth is 10)")
+    parser.add_argument("--bag", help="output bag of `salient_stereo replay` over the whole scene")
+    parser.add_argument("--bag-frame", type=int, help="number of the pair in the bag (default: found by frame number)")
+    parser.add_argument("--tool", help="salient_stereo executable, to measure accuracy of rectangles and time")
+    parser.add_argument("--roi", type=float, action="append", help="share of the centred rectangle (0.25 and 1)")
+    parser.add_argument("--disparities", type=int, default=192)
+    parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds of timing")
+    parser.add_argument("--json", help="write OpenCV's rows here, for `salient_stereo evaluate --peers`")
+    args = parser.parse_args()
+
+    cv2.setNumThreads(1)
+    scenes = [scene for folder in args.folder for scene in scenes_of(folder, args.scene, args.frame)]
+    if args.bag and len(scenes) != 1:
+        parser.error("a bag holds one scene: name it with --scene")
+    peers = []
+    for scene in scenes:
+        measure(scene, args, peers)
+    if args.json:
+        Path(args.json).write_text(json.dumps({"peers": peers}, indent=1))
 
 
 if __name__ == "__main__":
