@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod demo;
+pub mod evaluate;
 pub mod export_bag;
 pub mod node;
 pub mod render;
@@ -42,6 +43,8 @@ enum Command {
     ExportBag(export_bag::ExportBagArgs),
     /// Measure milliseconds per stage.
     Bench(bench::BenchArgs),
+    /// Measure methods on data with truth, and make the tables.
+    Evaluate(Box<evaluate::EvaluateArgs>),
     /// Render one of the project's own scenes as a bag with truth topics.
     Render(render::RenderArgs),
 }
@@ -85,6 +88,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::ExportBag(args) => export_bag::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
         Command::Render(args) => render::run(&args).map(|()| Outcome::Done).map_err(|e| {
             if e.is_usage() { CommandError::Usage(e.to_string()) } else { CommandError::failed(e) }
         }),

@@ -10,13 +10,19 @@
 
 mod figures;
 mod group;
+pub mod maps;
+pub mod measure;
+pub mod method;
+mod motion;
 pub mod part;
 mod peer;
 pub mod readme;
 pub mod report;
+mod run;
+mod shots;
+pub mod store;
 mod tables;
-
-use std::path::PathBuf;
+mod truth;
 
 use figures::Figures;
 pub use part::{Part, Run, Shot};
@@ -32,6 +38,4 @@ pub struct Evaluation {
     pub parts: Vec<Part>,
     /// What other matchers yield on the same pairs.
     pub peers: Vec<Peer>,
-    /// Where the pictures of [`Shot::file`] lie.
-    pub folder: PathBuf,
 }

@@ -102,6 +102,8 @@ pub struct Run {
     pub version: String,
     /// Commit it was built from; empty when unknown.
     pub commit: String,
+    /// Fingerprint of the program.
+    pub executable: String,
     /// Fingerprint of all parameters.
     pub config: String,
     /// Parameters that differ from their defaults: `name=value`.
@@ -125,6 +127,6 @@ pub struct Shot {
     pub measure: String,
     /// Its value.
     pub value: f64,
-    /// File name of the JPEG beside the part.
+    /// Path of the JPEG; in files of parts, from the folder of the store on.
     pub file: String,
 }

@@ -55,7 +55,7 @@ pub fn write<W: Write>(evaluation: &Evaluation, out: &mut W) -> io::Result<()> {
             "contents" => out.write_all(contents(&chapters).as_bytes()),
             "words" => out.write_all(words(&chapters).as_bytes()),
             "chapters" => {
-                let mut gallery = Gallery::new(&evaluation.folder);
+                let mut gallery = Gallery::default();
                 for (i, chapter) in chapters.iter().enumerate() {
                     write_chapter(i, chapter, evaluation, &mut gallery, out)?;
                 }

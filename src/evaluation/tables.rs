@@ -101,6 +101,11 @@ pub fn build(
     if measures.is_empty() {
         return None;
     }
+    // A method without any figure here (a baseline of attention has no
+    // disparity) has no row either.
+    let has_figure =
+        |merged: &&&Merged| measures.iter().any(|measure| measure.of(&merged.figures).is_some());
+    let rows: Vec<&Merged> = rows.iter().filter(has_figure).copied().collect();
     let row = |name: &str, quoted, value: &dyn Fn(&Measure) -> Option<f64>| Row {
         cells: std::iter::once(Cell::text(name))
             .chain(measures.iter().map(|measure| measure.cell(value(measure))))
@@ -115,7 +120,7 @@ pub fn build(
             .collect(),
         rows: Vec::new(),
     };
-    for merged in rows {
+    for merged in &rows {
         table.rows.push(row(merged.label(), false, &|measure| measure.of(&merged.figures)));
     }
     let quoted = |measure: &Measure| simulated(measure.key).map(|figure| figure.value);
@@ -130,7 +135,7 @@ pub fn build(
             shown.push(peer);
         }
     }
-    table.notes = circumstances(rows, &shown);
+    table.notes = circumstances(&rows, &shown);
     let figures = measures.iter().filter_map(|measure| simulated(measure.key));
     table.notes.extend(figures.map(simulated::Simulated::note));
     table.notes.dedup();

@@ -129,15 +129,25 @@ pub fn label_text(region: &Region) -> String {
 /// # Errors
 /// When the picture is empty or too large for the format.
 pub fn png(picture: &Image<[u8; 3]>) -> Result<Vec<u8>, PictureError> {
+    encode_png(picture.pixels().as_flattened(), picture.size(), ExtendedColorType::Rgb8)
+}
+
+/// PNG bytes of a gray picture.
+///
+/// # Errors
+/// When the picture is empty or too large for the format.
+pub fn png_gray(picture: &Image<u8>) -> Result<Vec<u8>, PictureError> {
+    encode_png(picture.pixels(), picture.size(), ExtendedColorType::L8)
+}
+
+fn encode_png(
+    pixels: &[u8],
+    size: Size,
+    color: ExtendedColorType,
+) -> Result<Vec<u8>, PictureError> {
     let mut bytes = Vec::new();
-    let size = picture.size();
     PngEncoder::new(&mut bytes)
-        .write_image(
-            picture.pixels().as_flattened(),
-            size.width as u32,
-            size.height as u32,
-            ExtendedColorType::Rgb8,
-        )
+        .write_image(pixels, size.width as u32, size.height as u32, color)
         .map_err(|source| PictureError::Encode { size, format: "PNG", source })?;
     Ok(bytes)
 }

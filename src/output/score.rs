@@ -6,8 +6,8 @@ mod frame;
 use std::convert::Infallible;
 
 pub use counts::{DistanceScore, RoiScore, ScoreSummary, Scores};
-pub use frame::FrameScore;
 use frame::Layout;
+pub use frame::{FrameScore, shrink_to};
 
 use super::Sink;
 use crate::input::Observation;

@@ -138,6 +138,15 @@ impl Layout {
     }
 }
 
+/// An image of a truth in the size of the views, and by how much they are
+/// smaller; `None` when the sizes do not fit.
+pub fn shrink_to<T: Copy + Default>(from: &Image<T>, size: Size) -> Option<(Image<T>, usize)> {
+    let factor = factor(from.size(), size)?;
+    let mut to = Image::default();
+    shrink(from, factor, size, &mut to);
+    Some((to, factor))
+}
+
 /// By how much the views are smaller than the truth: 1, 2 or 4.
 fn factor(truth: Size, view: Size) -> Option<usize> {
     if view.is_empty() {
