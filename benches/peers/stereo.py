@@ -82,7 +82,10 @@ class Scene:
     def __init__(self, folder, scene=None, frame="10"):
         folder = Path(folder)
         self.kitti = None
-        self.dataset, self.scene = "middlebury", folder.name
+        # The name that `evaluate` gives it: the folders from the one of the year on.
+        parts = folder.absolute().parts
+        years = [i for i, part in enumerate(parts) if part.lower().startswith("middlebury")]
+        self.dataset, self.scene = "middlebury", "/".join(parts[years[-1]:]) if years else folder.name
         if (folder / "im0.png").exists():
             self.left, self.right = folder / "im0.png", folder / "im1.png"
             truth = next(p for p in (folder / "disp0GT.pfm", folder / "disp0.pfm") if p.exists())
@@ -119,7 +122,7 @@ class Scene:
             self.occ = read_kitti_disparity(training / f"disp_occ{suffix}" / name)
             self.dataset, self.scene = "kitti2012" if is_2012 else "kitti2015", scene
             self.kitti = (folder, scene, frame)
-        self.name = self.left.stem if self.kitti else self.scene
+        self.name = self.left.stem if self.kitti else folder.name
 
     @staticmethod
     def scale_of(folder):
@@ -288,10 +291,13 @@ def measure(scene, args, peers):
         epe, d1, bad, dense = errors(disparity, scene.noc, everywhere)
         filled_epe, filled_d1, _, _ = errors(filled(disparity), scene.occ, everywhere)
         known = int((scene.noc > 0).sum())
-        row = {"known": known, "pixels": round(known * dense / 100), "epe_px": epe, "d1": d1 / 100, "bad_2": bad / 100, "density": dense / 100,
-               "filled_epe_px": filled_epe, "filled_d1": filled_d1 / 100, "matching_ms": statistics.median(times[name])}
-        peers.append({"dataset": scene.dataset, "scene": scene.scene, "method": f"OpenCV {name}",
-                      "version": cv2.__version__, **{key: value if isinstance(value, int) else float(value) for key, value in row.items()}})
+        peers.append({
+            "dataset": scene.dataset, "scene": scene.scene, "method": f"OpenCV {name}", "version": cv2.__version__,
+            "threads": 1, "matching_ms": statistics.median(times[name]), "known": known,
+            "pixels": round(known * dense / 100), "known_with_occluded": int((scene.occ > 0).sum()),
+            "epe_px": float(epe), "d1": float(d1) / 100, "bad_2": float(bad) / 100, "density": float(dense) / 100,
+            "filled_epe_px": float(filled_epe), "filled_d1": float(filled_d1) / 100,
+        })
 
     jobs = []
     if args.bag:

@@ -95,26 +95,28 @@ pub struct PeerTotal {
     pub label: String,
     /// The pairs, sorted.
     pub scenes: Vec<String>,
-    /// Means over the pairs; of the time the median.
+    /// Means over the pixels of all pairs; of the time the median over the pairs.
     pub mean: Peer,
 }
 
 impl PeerTotal {
     fn of(method: &str, peers: &[&Peer]) -> Option<Self> {
         let first = *peers.first()?;
-        let mean = |value: fn(&Peer) -> f64| {
-            peers.iter().map(|peer| value(peer)).sum::<f64>() / peers.len() as f64
+        // As our own scores: every pixel counts alike, in whichever pair it is.
+        let mean = |weight: fn(&Peer) -> u64, value: fn(&Peer) -> f64| {
+            let weights = peers.iter().map(|peer| weight(peer)).sum::<u64>().max(1) as f64;
+            peers.iter().map(|peer| weight(peer) as f64 * value(peer)).sum::<f64>() / weights
         };
         let mut times: Vec<f64> = peers.iter().map(|peer| peer.matching_ms).collect();
         times.sort_unstable_by(f64::total_cmp);
         let mean = Peer {
             scene: String::new(),
             matching_ms: *times.get(times.len() / 2)?,
-            epe_px: mean(|p| p.epe_px),
-            d1: mean(|p| p.d1),
-            bad_2: mean(|p| p.bad_2),
-            density: mean(|p| p.density),
-            filled_d1: mean(|p| p.filled_d1),
+            epe_px: mean(|p| p.pixels, |p| p.epe_px),
+            d1: mean(|p| p.pixels, |p| p.d1),
+            bad_2: mean(|p| p.pixels, |p| p.bad_2),
+            density: mean(|p| p.known, |p| p.density),
+            filled_d1: mean(|p| p.known_with_occluded, |p| p.filled_d1),
             ..first.clone()
         };
         let mut scenes: Vec<String> = peers.iter().map(|peer| peer.scene.clone()).collect();

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 /// ```json
 /// {"peers": [{
 ///     "dataset": "kitti2012", "scene": "000027", "method": "OpenCV SGBM", "version": "5.0.0",
-///     "machine": "8 cores", "threads": 1, "matching_ms": 310.5, "epe_px": 2.09,
+///     "machine": "8 cores", "threads": 1, "matching_ms": 310.5,
+///     "known": 96000, "pixels": 79000, "known_with_occluded": 101000, "epe_px": 2.09,
 ///     "d1": 0.072, "bad_2": 0.1, "density": 0.827, "filled_d1": 0.141
 /// }]}
 /// ```
@@ -37,6 +38,12 @@ pub struct Peer {
     pub threads: usize,
     /// Milliseconds from rectified images to disparity.
     pub matching_ms: f64,
+    /// Non-occluded pixels with known truth.
+    pub known: u64,
+    /// Of those, pixels with a disparity.
+    pub pixels: u64,
+    /// All pixels with known truth.
+    pub known_with_occluded: u64,
     /// End-point error in pixels, non-occluded.
     pub epe_px: f64,
     /// Share with an error above 3 px and 5 %.

@@ -91,6 +91,9 @@ fn peer(scene: &str, matching_ms: f64) -> Peer {
         version: "5.0.0".into(),
         threads: 1,
         matching_ms,
+        known: 1000,
+        pixels: 830,
+        known_with_occluded: 1100,
         epe_px: 2.0,
         d1: 0.07,
         bad_2: 0.1,
@@ -305,8 +308,8 @@ fn markdown_csv_and_json_hold_every_table() {
 #[test]
 fn peers_are_read_with_and_without_what_may_be_unknown() {
     let text = r#"{"peers": [{"dataset": "kitti2012", "scene": "000027", "method": "OpenCV SGBM",
-        "version": "5.0.0", "matching_ms": 310.5, "epe_px": 2.09, "d1": 0.072, "bad_2": 0.1,
-        "density": 0.827, "filled_d1": 0.141}]}"#;
+        "version": "5.0.0", "matching_ms": 310.5, "known": 96000, "pixels": 79000, "known_with_occluded": 101000,
+        "epe_px": 2.09, "d1": 0.072, "bad_2": 0.1, "density": 0.827, "filled_d1": 0.141}]}"#;
     let Peers { peers } = serde_json::from_str(text).unwrap();
     assert_eq!((peers[0].threads, peers[0].matching_ms), (0, 310.5));
     let alone = Evaluation { peers, ..Evaluation::default() };

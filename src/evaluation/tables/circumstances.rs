@@ -130,6 +130,6 @@ fn pairs(peer: &PeerTotal, rows: &[&Merged]) -> String {
     if !peer.mean.machine.is_empty() {
         parts.push(peer.mean.machine.clone());
     }
-    parts.push("means over the pairs, of the time the median.".into());
+    parts.push("means over the pixels of all pairs, of the time the median.".into());
     parts.join(", ")
 }
