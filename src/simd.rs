@@ -66,15 +66,25 @@ pub(crate) fn abs_diff<S: Simd>(a: u8x32<S>, b: u8x32<S>) -> u8x32<S> {
 
 /// Transposes 32 blocks: lane `j` of `blocks[i]` changes places with lane `i`
 /// of `blocks[j]`.
+#[inline(always)]
+pub(crate) fn transpose<S: Simd>(simd: S, blocks: &[Block; LANES]) -> [u8x32<S>; LANES] {
+    transpose_every(simd, blocks, 1)
+}
+
+/// Transposes every `step`-th of `blocks`, 32 in all.
 ///
 /// Five rounds of interleaving the upper with the lower half are a perfect
 /// shuffle of all 1024 bytes by five bits of their index, which swaps row and
 /// column.
 #[inline(always)]
-pub(crate) fn transpose<S: Simd>(simd: S, blocks: &[Block; LANES]) -> [u8x32<S>; LANES] {
+pub(crate) fn transpose_every<S: Simd>(
+    simd: S,
+    blocks: &[Block],
+    step: usize,
+) -> [u8x32<S>; LANES] {
     let mut rows = [u8x32::splat(simd, 0); LANES];
-    for (row, block) in rows.iter_mut().zip(blocks) {
-        *row = load_block(simd, block);
+    for (i, row) in rows.iter_mut().enumerate() {
+        *row = load_block(simd, &blocks[i * step]);
     }
     for _ in 0..5 {
         let mut next = rows;

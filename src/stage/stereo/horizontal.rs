@@ -4,7 +4,7 @@
 //! vector, and its latency is shared by 32 rows.
 
 use crate::simd::prelude::*;
-use crate::simd::{Block, LANES, Simd, abs_diff, load_block, transpose, u8x32};
+use crate::simd::{Block, LANES, Simd, abs_diff, load_block, transpose, transpose_every, u8x32};
 use crate::stage::stereo::census::{Census, PLANES};
 use crate::stage::stereo::cost::{Descriptors, Penalties, PenaltyLanes, hamming};
 use crate::stage::stereo::volume::{RunShape, Seeds, Volume};
@@ -22,7 +22,7 @@ pub struct Horizontal {
     weight: Vec<Block>,
     /// Path cost per disparity, one slot of padding on either side.
     state: Vec<Block>,
-    /// Path from the left, then both paths: tile by tile, disparity, column.
+    /// Both paths of one tile: column, disparity.
     both: Vec<Block>,
     /// Minimum over the disparities of the path from the left, per column.
     floor: Vec<Block>,
@@ -44,7 +44,7 @@ impl Horizontal {
         volume: &mut Volume,
     ) {
         self.prepare(simd, shape, left, right);
-        self.forward(simd, shape, penalties, seeds);
+        self.forward(simd, shape, penalties, seeds, volume);
         self.backward(simd, shape, penalties, seeds, volume);
     }
 
@@ -114,7 +114,6 @@ impl Horizontal {
         floor: u8x32<S>,
         p1: u8x32<S>,
         p2: u8x32<S>,
-        mut out: Option<(&mut [[Block; LANES]], usize)>,
     ) -> u8x32<S> {
         let n = state.len() - 2;
         let mut smaller = entering(simd, &state[0], floor, p2);
@@ -128,9 +127,6 @@ impl Horizontal {
             let right = load_descriptors(simd, descriptor);
             let cost = hamming(left, &right) + same.min(smaller.min(larger) + p1);
             cost.store_array(&mut state[i + 1]);
-            if let Some((out, column)) = &mut out {
-                cost.store_array(&mut out[i][*column]);
-            }
             least = least.min(cost);
             smaller = same;
             same = larger;
@@ -145,19 +141,16 @@ impl Horizontal {
         shape: &RunShape<'_>,
         penalties: Penalties,
         seeds: Option<&Seeds<'_>>,
+        volume: &mut Volume,
     ) {
-        let mut both = std::mem::take(&mut self.both);
-        both.resize(shape.blocks_in_columns(), [0; LANES]);
         self.floor.resize(shape.width(), [0; LANES]);
         if let Some(seeds) = seeds {
             seeds.fill_column(&shape.tiles[0], shape, seeds.left, penalties.p2, &mut self.state);
         }
         let mut floor = u8x32::splat(simd, 0);
-        let mut out = 0;
         for (k, tile) in shape.tiles.iter().enumerate() {
             let base = tile.lo - shape.lo;
-            let tile_out = both[out..out + tile.n * LANES].as_chunks_mut::<LANES>().0;
-            for column in 0..LANES {
+            for (column, out) in volume.tile_mut(k).chunks_exact_mut(tile.n).enumerate() {
                 let x = k * LANES + column;
                 let lanes = self.penalties(simd, penalties, x);
                 let gray = load_block(simd, &self.gray[x]);
@@ -166,16 +159,14 @@ impl Horizontal {
                 let left = self.left_at(simd, x);
                 let right = &self.right[shape.right_from(x, tile) * PLANES..];
                 let state = &mut self.state[base..base + tile.n + 2];
-                let out = (&mut tile_out[..tile.n], column);
-                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2, Some(out));
+                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2);
+                out.copy_from_slice(&state[1..=tile.n]);
                 floor.store_array(&mut self.floor[x]);
                 if column == 0 {
                     self.forget_outside(base, tile.n);
                 }
             }
-            out += tile.n * LANES;
         }
-        self.both = both;
     }
 
     /// Forgets what an adjacent tile left at disparities this one has not.
@@ -206,12 +197,11 @@ impl Horizontal {
             );
         }
         let mut floor = u8x32::splat(simd, 0);
-        let mut end = self.both.len();
         for (k, tile) in shape.tiles.iter().enumerate().rev() {
-            let start = end - tile.n * LANES;
-            end = start;
             let base = tile.lo - shape.lo;
             let mut floors = [[0; LANES]; LANES];
+            self.both.resize(tile.n * LANES, [0; LANES]);
+            let sums = volume.tile_mut(k);
             for column in (0..LANES).rev() {
                 let x = k * LANES + column;
                 let lanes = self.penalties(simd, penalties, x);
@@ -221,27 +211,26 @@ impl Horizontal {
                 let left = self.left_at(simd, x);
                 let right = &self.right[shape.right_from(x, tile) * PLANES..];
                 let state = &mut self.state[base..base + tile.n + 2];
-                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2, None);
+                floor = Self::column(simd, &left, right, state, floor, lanes.p1, p2);
                 let forward_floor = load_block(simd, &self.floor[x]);
                 (floor + forward_floor).store_array(&mut floors[column]);
-                for i in 0..tile.n {
-                    let at = &mut self.both[start + i * LANES + column];
-                    let forward = load_block(simd, at).saturating_sub(forward_floor);
-                    let backward =
-                        load_block(simd, &self.state[base + 1 + i]).saturating_sub(floor);
-                    forward.saturating_add(backward).store_array(at);
+                let from_left = &sums[column * tile.n..(column + 1) * tile.n];
+                let both = &mut self.both[column * tile.n..(column + 1) * tile.n];
+                for ((both, from_left), from_right) in
+                    both.iter_mut().zip(from_left).zip(&state[1..])
+                {
+                    let from_left = load_block(simd, from_left).saturating_sub(forward_floor);
+                    let from_right = load_block(simd, from_right).saturating_sub(floor);
+                    from_left.saturating_add(from_right).store_array(both);
                 }
                 if column == LANES - 1 {
                     self.forget_outside(base, tile.n);
                 }
             }
-            let sums = volume.tile_mut(k);
-            let stride = tile.n;
-            for (i, block) in
-                self.both[start..start + tile.n * LANES].as_chunks::<LANES>().0.iter().enumerate()
-            {
-                for (y, row) in transpose(simd, block).iter().enumerate() {
-                    row.store_array(&mut sums[y * stride + i]);
+            // The path from the left has been read: its place is taken by the sums.
+            for i in 0..tile.n {
+                for (y, row) in transpose_every(simd, &self.both[i..], tile.n).iter().enumerate() {
+                    row.store_array(&mut sums[y * tile.n + i]);
                 }
             }
             for (y, row) in transpose(simd, &floors).iter().enumerate() {

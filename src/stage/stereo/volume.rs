@@ -75,14 +75,10 @@ impl RunShape<'_> {
     pub const fn right_from(&self, x: usize, tile: &Tile) -> usize {
         x + self.hi - (tile.lo + tile.n)
     }
-
-    /// Blocks of a buffer with one block per disparity and column.
-    pub fn blocks_in_columns(&self) -> usize {
-        self.tiles.iter().map(|t| t.n * LANES).sum()
-    }
 }
 
-/// Sums of path costs: tile by tile, row, disparity, 32 columns.
+/// Sums of path costs: tile by tile, row, disparity, 32 columns. (While the
+/// horizontal paths are at work: column, disparity, 32 rows.)
 #[derive(Default)]
 pub struct Volume {
     sums: Vec<Block>,
