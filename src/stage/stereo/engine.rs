@@ -218,6 +218,7 @@ impl Scratch {
         let (left, right, seeds) = (&self.left, &self.right, seeds.as_ref());
         let penalties = settings.penalties;
         let volume = &mut self.volume;
+        self.right_winner.start(run.x0, &shape);
         let mut finish = Finish {
             views,
             shape: &shape,
@@ -248,7 +249,7 @@ impl Scratch {
                         let floors = *volume.floor_mut(k, y);
                         finish.row(simd, k, y, volume.row(k, y), &floors);
                     }
-                    finish.vote(simd, y, volume);
+                    finish.vote(simd, y);
                 }
             }
         }
@@ -270,9 +271,8 @@ pub struct Finish<'a> {
 impl Finish<'_> {
     /// Right winners of row `y`, once all its tiles are finished.
     #[inline(always)]
-    pub fn vote<S: Simd>(&mut self, simd: S, y: usize, volume: &Volume) {
-        let width = self.views.left.width();
-        self.right.vote(simd, (self.x0, y), width, self.shape.tiles, volume);
+    pub fn vote<S: Simd>(&mut self, simd: S, y: usize) {
+        self.right.vote(simd, y);
     }
 
     /// Takes the sums of row `y` of tile `k`.
@@ -289,6 +289,7 @@ impl Finish<'_> {
         let x = self.x0 + k * LANES;
         let inside = (width - x).min(LANES);
         let lo = self.shape.tiles[k].lo;
+        self.right.take(simd, k, lo, inside, costs);
         let found = winners(simd, costs, lo, floors, self.uniqueness_ratio);
         let at = y * width + x;
         let left = &mut self.left[at..at + inside];
@@ -297,10 +298,10 @@ impl Finish<'_> {
         evidence.copy_from_slice(&found.evidence[..inside]);
         if let Some(mask) = self.views.mask {
             let mask = &mask.row(self.y0 + y)[x..x + inside];
+            // Without a branch, so that it becomes vector code.
             for ((d, e), &m) in left.iter_mut().zip(evidence).zip(mask) {
-                if m == 0 {
-                    (*d, *e) = (NO_MATCH, 0);
-                }
+                *d = if m == 0 { NO_MATCH } else { *d };
+                *e = if m == 0 { 0 } else { *e };
             }
         }
     }

@@ -2,40 +2,34 @@
 
 use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, abs_diff, load, load_block, store, u8x32};
-use crate::stage::stereo::census::Census;
+use crate::stage::stereo::census::{Census, PLANES};
 use crate::stage::stereo::cost::{Penalties, PenaltyLanes, descriptors, hamming};
 use crate::stage::stereo::engine::Finish;
 use crate::stage::stereo::plan::Tile;
 use crate::stage::stereo::volume::{RunShape, Seeds, Volume};
 
-/// Path costs of one row, disparity by disparity, with padding of one vector on
-/// either side and of one disparity at either end that always holds 255
-/// ("nothing known": such a value is later cut to P2).
-#[derive(Default)]
-struct Path {
-    state: Vec<u8>,
-    floor: Vec<u8>,
-}
-
-impl Path {
-    fn reset(&mut self, range: usize, stride: usize) {
-        self.state.clear();
-        self.state.resize((range + 2) * stride, 255);
-        self.floor.clear();
-        self.floor.resize(stride, 0);
-    }
-}
+/// The paths of a sweep, as layers of its state.
+const STRAIGHT: usize = 0;
+/// Coming from the left: of one row, and of the next one.
+const FROM_LEFT: usize = 1;
+/// Coming from the right likewise.
+const FROM_RIGHT: usize = 3;
+const LAYERS: usize = 5;
 
 /// State of the paths that come down, or go up.
 #[derive(Default)]
 pub struct Vertical {
-    straight: Path,
-    /// Coming from the left, of the previous and of the current row.
-    from_left: [Path; 2],
-    /// Coming from the right likewise.
-    from_right: [Path; 2],
+    /// Path costs of one row: disparity, layer, column, with padding of one
+    /// vector on either side of the columns and of one disparity at either end
+    /// that always holds 255 ("nothing known": such a value is later cut to P2).
+    costs: Vec<u8>,
+    /// Their minimum over the disparities: layer, column.
+    floors: Vec<u8>,
+    /// Which of its two layers holds a diagonal path's previous row: 0 or 1.
+    turn: usize,
     /// Sum of the paths of one row of one tile.
     sums: Vec<Block>,
+    /// Length of a layer.
     stride: usize,
 }
 
@@ -116,16 +110,16 @@ impl Vertical {
                 if y >= shape.rows {
                     continue;
                 }
-                for (out, sum) in volume.row_mut(k, y).iter_mut().zip(&self.sums) {
-                    let sum = load_block(simd, sum).saturating_sub(floor);
-                    load_block(simd, out).saturating_add(sum).store_array(out);
+                for (sum, before) in self.sums.iter_mut().zip(volume.row(k, y)) {
+                    let cost = load_block(simd, sum).saturating_sub(floor);
+                    load_block(simd, before).saturating_add(cost).store_array(sum);
                 }
                 add_floors(volume.floor_mut(k, y), floor);
                 let floors = *volume.floor_mut(k, y);
-                finish.row(simd, k, y, volume.row(k, y), &floors);
+                finish.row(simd, k, y, &self.sums[..tile.n], &floors);
             }
             if row < shape.context_above + shape.rows {
-                finish.vote(simd, row - shape.context_above, volume);
+                finish.vote(simd, row - shape.context_above);
             }
             self.turn();
         }
@@ -134,14 +128,19 @@ impl Vertical {
     #[inline(always)]
     fn reset<const DIAGONALS: bool>(&mut self, shape: &RunShape<'_>) {
         self.stride = shape.width() + 2 * LANES;
-        self.straight.reset(shape.range(), self.stride);
-        if DIAGONALS {
-            for path in self.from_left.iter_mut().chain(&mut self.from_right) {
-                path.reset(shape.range(), self.stride);
-            }
-        }
+        self.turn = 0;
+        self.costs.clear();
+        self.costs.resize((shape.range() + 2) * self.slot::<DIAGONALS>(), 255);
+        self.floors.clear();
+        self.floors.resize(self.slot::<DIAGONALS>(), 0);
         let most = shape.tiles.iter().map(|t| t.n).max().unwrap_or(0);
         self.sums.resize(most, [0; LANES]);
+    }
+
+    /// Length of what is held of one disparity.
+    #[inline(always)]
+    fn slot<const DIAGONALS: bool>(&self) -> usize {
+        if DIAGONALS { LAYERS * self.stride } else { self.stride }
     }
 
     /// Paths enter the first row from the coarse disparities at image row `y`.
@@ -153,33 +152,28 @@ impl Vertical {
         seeds: &Seeds<'_>,
         y: usize,
     ) {
+        let slot = self.slot::<DIAGONALS>();
+        let used: &[usize] =
+            if DIAGONALS { &[STRAIGHT, FROM_LEFT, FROM_RIGHT] } else { &[STRAIGHT] };
         for (k, tile) in shape.tiles.iter().enumerate() {
             let mut coarse = [f32::NAN; LANES];
             for (i, coarse) in coarse.iter_mut().enumerate() {
                 *coarse = seeds.at(k * LANES + i, y);
             }
             for d in tile.lo..tile.lo + tile.n {
-                let at = self.index(shape, k, d);
                 let lanes = Seeds::costs(&coarse, d, penalties.p2);
-                self.straight.state[at..at + LANES].copy_from_slice(&lanes);
-                if DIAGONALS {
-                    self.from_left[0].state[at..at + LANES].copy_from_slice(&lanes);
-                    self.from_right[0].state[at..at + LANES].copy_from_slice(&lanes);
+                for layer in used {
+                    let at = (d - shape.lo + 1) * slot + layer * self.stride + (k + 1) * LANES;
+                    self.costs[at..at + LANES].copy_from_slice(&lanes);
                 }
             }
         }
     }
 
-    #[inline(always)]
-    fn index(&self, shape: &RunShape<'_>, tile: usize, d: usize) -> usize {
-        (d - shape.lo + 1) * self.stride + (tile + 1) * LANES
-    }
-
     /// The current row becomes the previous one.
     #[inline(always)]
     fn turn(&mut self) {
-        self.from_left.swap(0, 1);
-        self.from_right.swap(0, 1);
+        self.turn = 1 - self.turn;
     }
 
     /// One row of one tile:
@@ -210,82 +204,89 @@ impl Vertical {
         let from = left.gray(step.from);
 
         let l = descriptors(simd, left.planes(step.row), left.stride(), x);
-        let right_row = right.planes(step.row);
-        let right_first = shape.right_from(x, tile) + tile.n - 1;
-        let base = self.index(shape, k, tile.lo);
+        // Disparities grow to the left in the right image.
+        let right_from = shape.right_from(x, tile);
+        let span = (PLANES - 1) * right.stride() + LANES;
+        let partners =
+            right.planes(step.row)[right_from..right_from + tile.n - 1 + span].windows(span).rev();
+        let slot = self.slot::<DIAGONALS>();
         let sums = &mut self.sums[..tile.n];
+        let first = (tile.lo - shape.lo) * slot;
+        let mut slots = self.costs[first..first + (tile.n + 2) * slot].chunks_exact_mut(slot);
+        let (Some(smallest), Some(mut here)) = (slots.next(), slots.next()) else {
+            return u8x32::splat(simd, 0);
+        };
 
-        let s_state = &mut self.straight.state[..];
-        let s_floor = load(simd, &self.straight.floor, centre);
-        let s_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, LANES + x)));
-        let mut s_smaller = entering(simd, s_state, base - stride, s_floor, s_p2);
-        let mut s_same = entering(simd, s_state, base, s_floor, s_p2);
+        let s_at = STRAIGHT * stride + centre;
+        let s_floor = load(simd, &self.floors, s_at);
+        let s_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, centre)));
+        let mut s_smaller = entering(simd, smallest, s_at, s_floor, s_p2);
+        let mut s_same = entering(simd, here, s_at, s_floor, s_p2);
         let mut s_least = u8x32::splat(simd, 255);
 
         if !DIAGONALS {
-            for (i, sum) in sums.iter_mut().enumerate() {
-                let at = base + i * stride;
-                let r = descriptors(simd, right_row, right.stride(), right_first - i);
-                let cost = hamming(&l, &r);
-                let s_larger = entering(simd, s_state, at + stride, s_floor, s_p2);
+            for ((sum, partner), next) in sums.iter_mut().zip(partners).zip(slots) {
+                let cost = hamming(&l, &descriptors(simd, partner, right.stride(), 0));
+                let s_larger = entering(simd, next, s_at, s_floor, s_p2);
                 let s = cost + s_same.min(s_smaller.min(s_larger) + p1);
-                store(s_state, at, s);
+                store(here, s_at, s);
                 s_least = s_least.min(s);
                 s_smaller = s_same;
                 s_same = s_larger;
                 s.store_array(sum);
+                here = next;
             }
-            store(&mut self.straight.floor, centre, s_least);
+            store(&mut self.floors, s_at, s_least);
             return s_least;
         }
 
-        let [l_prev, l_next] = &mut self.from_left;
-        let (l_prev_state, l_next_state) = (&l_prev.state[..], &mut l_next.state[..]);
-        let l_floor = load(simd, &l_prev.floor, centre - 1);
-        let l_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, LANES + x - 1)));
-        let mut l_smaller = entering(simd, l_prev_state, base - stride - 1, l_floor, l_p2);
-        let mut l_same = entering(simd, l_prev_state, base - 1, l_floor, l_p2);
+        let (before, after) = (self.turn * stride, (1 - self.turn) * stride);
+        let l_at = FROM_LEFT * stride + before + centre - 1;
+        let l_to = FROM_LEFT * stride + after + centre;
+        let l_floor = load(simd, &self.floors, l_at);
+        let l_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, centre - 1)));
+        let mut l_smaller = entering(simd, smallest, l_at, l_floor, l_p2);
+        let mut l_same = entering(simd, here, l_at, l_floor, l_p2);
         let mut l_least = u8x32::splat(simd, 255);
 
-        let [r_prev, r_next] = &mut self.from_right;
-        let (r_prev_state, r_next_state) = (&r_prev.state[..], &mut r_next.state[..]);
-        let r_floor = load(simd, &r_prev.floor, centre + 1);
-        let r_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, LANES + x + 1)));
-        let mut r_smaller = entering(simd, r_prev_state, base - stride + 1, r_floor, r_p2);
-        let mut r_same = entering(simd, r_prev_state, base + 1, r_floor, r_p2);
+        let r_at = FROM_RIGHT * stride + before + centre + 1;
+        let r_to = FROM_RIGHT * stride + after + centre;
+        let r_floor = load(simd, &self.floors, r_at);
+        let r_p2 = lanes.p2_across(abs_diff(gray, load(simd, from, centre + 1)));
+        let mut r_smaller = entering(simd, smallest, r_at, r_floor, r_p2);
+        let mut r_same = entering(simd, here, r_at, r_floor, r_p2);
         let mut r_least = u8x32::splat(simd, 255);
 
-        for (i, sum) in sums.iter_mut().enumerate() {
-            let at = base + i * stride;
-            let r = descriptors(simd, right_row, right.stride(), right_first - i);
-            let cost = hamming(&l, &r);
+        for ((sum, partner), next) in sums.iter_mut().zip(partners).zip(slots) {
+            let cost = hamming(&l, &descriptors(simd, partner, right.stride(), 0));
 
-            let s_larger = entering(simd, s_state, at + stride, s_floor, s_p2);
+            let s_larger = entering(simd, next, s_at, s_floor, s_p2);
             let s = cost + s_same.min(s_smaller.min(s_larger) + p1);
-            store(s_state, at, s);
+            store(here, s_at, s);
             s_least = s_least.min(s);
             s_smaller = s_same;
             s_same = s_larger;
 
-            let l_larger = entering(simd, l_prev_state, at + stride - 1, l_floor, l_p2);
+            let l_larger = entering(simd, next, l_at, l_floor, l_p2);
             let from_left = cost + l_same.min(l_smaller.min(l_larger) + p1);
-            store(l_next_state, at, from_left);
+            store(here, l_to, from_left);
             l_least = l_least.min(from_left);
             l_smaller = l_same;
             l_same = l_larger;
 
-            let r_larger = entering(simd, r_prev_state, at + stride + 1, r_floor, r_p2);
+            let r_larger = entering(simd, next, r_at, r_floor, r_p2);
             let from_right = cost + r_same.min(r_smaller.min(r_larger) + p1);
-            store(r_next_state, at, from_right);
+            store(here, r_to, from_right);
             r_least = r_least.min(from_right);
             r_smaller = r_same;
             r_same = r_larger;
 
             s.saturating_add(from_left).saturating_add(from_right).store_array(sum);
+            here = next;
         }
-        store(&mut self.straight.floor, centre, s_least);
-        store(&mut l_next.floor, centre, l_least);
-        store(&mut r_next.floor, centre, r_least);
+        store(&mut self.floors, s_at, s_least);
+        store(&mut self.floors, l_to, l_least);
+        store(&mut self.floors, r_to, r_least);
         s_least.saturating_add(l_least).saturating_add(r_least)
     }
 }

@@ -1,10 +1,11 @@
 //! The disparity of least cost, seen from the left and from the right image.
 
+use std::ops::Range;
+
 use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, load, load_block, store, u8x32};
 use crate::stage::stereo::NO_MATCH;
-use crate::stage::stereo::plan::Tile;
-use crate::stage::stereo::volume::Volume;
+use crate::stage::stereo::volume::RunShape;
 
 /// Units of [`crate::perception::DISPARITY_STEP`] per pixel.
 pub const STEPS: i32 = 32;
@@ -24,78 +25,127 @@ pub struct RightWinner {
     cost: Vec<u8>,
     index: Vec<u8>,
     stride: usize,
-    pad: usize,
     lo: usize,
     shift: u32,
+    /// Columns that may have a partner.
+    columns: Range<usize>,
+    /// Sums of one row of a run: disparity, column, with a vector of padding on
+    /// either side; 255 where a tile has not this disparity.
+    sums: Vec<u8>,
+    sums_stride: usize,
+    /// First column of the run.
+    x0: usize,
+    /// Smallest disparity of the run.
+    first: usize,
+    spans: Vec<Span>,
+}
+
+/// Where 32 right pixels have left partners.
+struct Span {
+    /// Image column of the first one.
+    x: usize,
+    /// Disparities of the tiles that they may meet.
+    disparities: Range<usize>,
 }
 
 impl RightWinner {
     /// Forgets everything; `rows` of `width` pixels and disparities `lo .. hi` come.
     pub fn reset(&mut self, width: usize, rows: usize, lo: usize, hi: usize) {
-        self.pad = hi;
         self.lo = lo;
         self.shift = shift_for(hi - lo);
-        self.stride = width + hi + 2 * LANES;
+        self.columns = width..0;
+        self.stride = width + 2 * LANES;
         self.cost.clear();
         self.cost.resize(self.stride * rows, 255);
         self.index.clear();
         self.index.resize(self.stride * rows, 0);
     }
 
-    /// The left pixels of row `y` from column `x0` on vote, all tiles of a run.
-    /// Lanes from column `width` on are no pixels.
-    ///
-    /// The loop over disparities is the outer one: with it inside, every vector
-    /// would be loaded again one byte beside where it has just been stored,
-    /// which stalls the processor's store forwarding.
-    #[inline(always)]
-    pub fn vote<S: Simd>(
-        &mut self,
-        simd: S,
-        (x0, y): (usize, usize),
-        width: usize,
-        tiles: &[Tile],
-        volume: &Volume,
-    ) {
-        let row = y * self.stride;
-        let cost_row = &mut self.cost[row..row + self.stride];
-        let index_row = &mut self.index[row..row + self.stride];
-        let (pad, lo, shift) = (self.pad, self.lo, self.shift);
-        let from = tiles.iter().map(|t| t.lo).min().unwrap_or(0);
-        let to = tiles.iter().map(|t| t.lo + t.n).max().unwrap_or(0);
-        for d in from..to {
-            let mine = u8x32::splat(simd, ((d - lo) >> shift) as u8);
-            for (k, tile) in tiles.iter().enumerate() {
-                if d < tile.lo || d >= tile.lo + tile.n {
-                    continue;
+    /// The rows of a run come, whose first column is `x0`.
+    pub fn start(&mut self, x0: usize, shape: &RunShape<'_>) {
+        let width = shape.width();
+        self.x0 = x0;
+        self.first = shape.lo;
+        self.sums_stride = width + 2 * LANES;
+        self.sums.clear();
+        self.sums.resize(self.sums_stride * shape.range(), 255);
+        self.spans.clear();
+        let from = (x0 + 1).saturating_sub(shape.hi);
+        for x in (from..x0 + width - shape.lo.min(x0 + width)).step_by(LANES) {
+            let (mut least, mut most) = (usize::MAX, 0);
+            for (k, tile) in shape.tiles.iter().enumerate() {
+                // Disparities at which one of these pixels meets one of the tile's.
+                let column = x0 + k * LANES;
+                let lo = (column + 1).saturating_sub(x + LANES).max(tile.lo);
+                let hi = (column + LANES).saturating_sub(x).min(tile.lo + tile.n);
+                if lo < hi {
+                    (least, most) = (least.min(lo), most.max(hi));
                 }
-                let mut cost = load_block(simd, &volume.row(k, y)[d - tile.lo]);
-                let x = x0 + k * LANES;
-                if x + LANES > width {
-                    let mut outside = [255; LANES];
-                    outside[..width - x].fill(0);
-                    cost |= load_block(simd, &outside);
-                }
-                let at = x + pad - d;
-                let best = load(simd, cost_row, at);
-                let index = load(simd, index_row, at);
-                let better = cost.simd_lt(best);
-                store(cost_row, at, cost.min(best));
-                store(index_row, at, better.select(mine, index));
+            }
+            if least < most {
+                self.columns.start = self.columns.start.min(x);
+                self.columns.end = self.columns.end.max(x + LANES);
+                self.spans.push(Span { x, disparities: least..most });
             }
         }
     }
 
-    /// Disparities of the right pixels of row `y`, in units of
-    /// [`crate::perception::DISPARITY_STEP`].
+    /// Takes the sums of tile `k`, from disparity `lo` on. Lanes from `inside`
+    /// on are no pixels.
+    #[inline(always)]
+    pub fn take<S: Simd>(&mut self, simd: S, k: usize, lo: usize, inside: usize, costs: &[Block]) {
+        let mut outside = [255; LANES];
+        outside[..inside].fill(0);
+        let outside = load_block(simd, &outside);
+        let at = (lo - self.first) * self.sums_stride + (k + 1) * LANES;
+        let rows = self.sums[at..].chunks_mut(self.sums_stride);
+        for (row, cost) in rows.zip(costs) {
+            store(row, 0, load_block(simd, cost) | outside);
+        }
+    }
+
+    /// The right pixels choose among the left ones of row `y`, once all tiles
+    /// of the run have been taken.
+    ///
+    /// Every vector of right pixels looks at all its disparities in turn: its
+    /// best stays in registers. (The other way round, left pixels voting, the
+    /// same bytes would be stored and loaded again one place further on, which
+    /// stalls the processor's store forwarding.)
+    #[inline(always)]
+    pub fn vote<S: Simd>(&mut self, simd: S, y: usize) {
+        let row = y * self.stride;
+        let (stride, first) = (self.sums_stride, self.first);
+        for Span { x, disparities } in &self.spans {
+            let at = row + x;
+            let mut best = load(simd, &self.cost, at);
+            let mut index = load(simd, &self.index, at);
+            let start =
+                (disparities.start - first) * stride + x + disparities.start + LANES - self.x0;
+            let sums = self.sums[start..].chunks(stride + 1);
+            for (d, sums) in disparities.clone().zip(sums) {
+                let cost = load(simd, sums, 0);
+                let mine = u8x32::splat(simd, ((d - self.lo) >> self.shift) as u8);
+                index = cost.simd_lt(best).select(mine, index);
+                best = best.min(cost);
+            }
+            store(&mut self.cost, at, best);
+            store(&mut self.index, at, index);
+        }
+    }
+
+    /// Writes the disparities of the right pixels of row `y` that have a
+    /// partner, in units of [`crate::perception::DISPARITY_STEP`].
     #[inline(always)]
     pub fn finish(&self, y: usize, out: &mut [i16]) {
-        let at = y * self.stride + self.pad;
-        let width = out.len();
-        let costs = &self.cost[at..at + width];
-        let indices = &self.index[at..at + width];
-        for ((out, &cost), &index) in out.iter_mut().zip(costs).zip(indices) {
-            let d = (self.lo + ((index as usize) << self.shift)) as i32 * STEPS;
+        let columns = self.columns.start..self.columns.end.min(out.len());
+        if columns.is_empty() {
+            return;
+        }
+        let row = y * self.stride;
+        let costs = &self.cost[row + columns.start..row + columns.end];
+        let indices = &self.index[row + columns.start..row + columns.end];
+        for ((out, &cost), &index) in out[columns].iter_mut().zip(costs).zip(indices) {
+            let d = (self.lo as i32 + ((index as i32) << self.shift)) * STEPS;
             *out = if cost == 255 { NO_MATCH } else { d as i16 };
         }
     }
@@ -124,38 +174,53 @@ pub fn winners<S: Simd>(
 ) -> Winners {
     let n = costs.len();
     let shift = shift_for(n);
-    let mut best = u8x32::splat(simd, 255);
+    // The costs beside the best one are kept along with it. At an end of the
+    // range nothing is known beyond it: the best stands in for both there.
+    let mut before = load_block(simd, &costs[0]);
+    let (mut best, mut smaller, mut larger) = (before, before, before);
     let mut index = u8x32::splat(simd, 0);
-    for (i, cost) in costs.iter().enumerate() {
-        let cost = load_block(simd, cost);
+    if n > 1 {
+        let mut cost = load_block(simd, &costs[1]);
+        for (i, after) in costs.iter().enumerate().skip(2) {
+            let after = load_block(simd, after);
+            let better = cost.simd_lt(best);
+            best = best.min(cost);
+            index = better.select(u8x32::splat(simd, ((i - 1) >> shift) as u8), index);
+            smaller = better.select(before, smaller);
+            larger = better.select(after, larger);
+            before = cost;
+            cost = after;
+        }
         let better = cost.simd_lt(best);
         best = best.min(cost);
-        index = better.select(u8x32::splat(simd, (i >> shift) as u8), index);
+        index = better.select(u8x32::splat(simd, ((n - 1) >> shift) as u8), index);
+        smaller = better.select(cost, smaller);
+        larger = better.select(cost, larger);
     }
     // The second best that is no neighbour of the best.
     let mut second = u8x32::splat(simd, 255);
     let one = u8x32::splat(simd, 1);
+    let (from, to) = (index.saturating_sub(one), index.saturating_add(one));
     for (i, cost) in costs.iter().enumerate() {
         let i = u8x32::splat(simd, (i >> shift) as u8);
-        let distance = i.saturating_sub(index) | index.saturating_sub(i);
+        let near = i.max(from).min(to).simd_eq(i);
         let cost = load_block(simd, cost);
-        second = second.min(distance.simd_le(one).select(u8x32::splat(simd, 255), cost));
+        second = second.min(near.select(u8x32::splat(simd, 255), cost));
     }
     let (best, second, index) = (best.to_array(), second.to_array(), index.to_array());
+    let (smaller, larger) = (smaller.to_array(), larger.to_array());
     // What follows is arithmetic of single pixels; each loop is over lanes and
     // without branches, so that it becomes vector code as well.
     let mut place = [0_usize; LANES];
-    let (mut smaller, mut larger) = ([0_u8; LANES], [0_u8; LANES]);
     for lane in 0..LANES {
-        let mut i = (index[lane] as usize) << shift;
-        while shift > 0 && best[lane] < 255 && costs[i][lane] != best[lane] {
-            i += 1;
+        place[lane] = (index[lane] as usize) << shift;
+    }
+    if shift > 0 {
+        for (lane, place) in place.iter_mut().enumerate() {
+            while best[lane] < 255 && costs[*place][lane] != best[lane] {
+                *place += 1;
+            }
         }
-        place[lane] = i;
-        // At an end of the range nothing is known beyond it: no offset then.
-        let both = i > 0 && i + 1 < n;
-        smaller[lane] = if both { costs[i - 1][lane] } else { best[lane] };
-        larger[lane] = if both { costs[i + 1][lane] } else { best[lane] };
     }
     let mut out = Winners { disparity: [NO_MATCH; LANES], evidence: [0; LANES] };
     for lane in 0..LANES {
