@@ -30,6 +30,16 @@ pub const OFFSETS: [(isize, isize); 32] = {
     offsets
 };
 
+/// Bits of 32 descriptors, the uppermost first. (A loop would not be unrolled,
+/// and offsets that are known only at run time cost two checks each.)
+macro_rules! plane {
+    ($simd:expr, $window:expr, $($bit:literal)+) => {{
+        let mut byte = u8x32::splat($simd, 0);
+        $(byte = byte + byte + brighter::<S, $bit>($simd, $window);)+
+        byte
+    }};
+}
+
 /// Gray rows and descriptors of a rectangle that may reach beyond the image,
 /// whose pixels are then those of the border.
 #[derive(Default)]
@@ -65,18 +75,15 @@ impl Census {
         }
         for (i, planes) in self.planes.chunks_exact_mut(self.stride * PLANES).enumerate() {
             let gray = &self.gray[i * self.gray_stride..(i + 2 * REACH_Y + 1) * self.gray_stride];
+            let (first, rest) = planes.split_at_mut(self.stride);
+            let (second, rest) = rest.split_at_mut(self.stride);
+            let (third, fourth) = rest.split_at_mut(self.stride);
             for x in (0..self.stride).step_by(LANES) {
-                let at = REACH_Y * self.gray_stride + LANES + x;
-                let centre = load(simd, gray, at);
-                for plane in 0..PLANES {
-                    let mut byte = u8x32::splat(simd, 0);
-                    for &(dx, dy) in OFFSETS.iter().skip(plane * 8).take(8).rev() {
-                        let step = dy * self.gray_stride as isize + dx;
-                        let pixel = load(simd, gray, (at as isize + step) as usize);
-                        byte = byte + byte + pixel.saturating_sub(centre).min(1);
-                    }
-                    store(planes, plane * self.stride + x, byte);
-                }
+                let window = window(gray, self.gray_stride, LANES + x - REACH_X);
+                store(first, x, plane!(simd, &window, 7 6 5 4 3 2 1 0));
+                store(second, x, plane!(simd, &window, 15 14 13 12 11 10 9 8));
+                store(third, x, plane!(simd, &window, 23 22 21 20 19 18 17 16));
+                store(fourth, x, plane!(simd, &window, 31 30 29 28 27 26 25 24));
             }
         }
     }
@@ -98,6 +105,33 @@ impl Census {
         let at = (row + REACH_Y) * self.gray_stride;
         &self.gray[at..at + self.gray_stride]
     }
+}
+
+/// Columns that the descriptors of one vector look at.
+const SPAN: usize = LANES + 2 * REACH_X;
+
+/// What the descriptors of one vector look at. (Of known size, so that no
+/// access needs a check.)
+type Window<'a> = [&'a [u8; SPAN]; 2 * REACH_Y + 1];
+
+#[inline(always)]
+fn window(gray: &[u8], stride: usize, at: usize) -> Window<'_> {
+    let mut window = [&[0; SPAN]; 2 * REACH_Y + 1];
+    for (i, row) in window.iter_mut().enumerate() {
+        if let Some(span) = gray[i * stride + at..].first_chunk() {
+            *row = span;
+        }
+    }
+    window
+}
+
+/// 1 where bit `BIT` of a descriptor is set.
+#[inline(always)]
+fn brighter<S: Simd, const BIT: usize>(simd: S, window: &Window<'_>) -> u8x32<S> {
+    let (dx, dy) = const { OFFSETS[BIT] };
+    let (x, y) = ((REACH_X as isize + dx) as usize, (REACH_Y as isize + dy) as usize);
+    let pixel = load(simd, window[y], x);
+    pixel.saturating_sub(load(simd, window[REACH_Y], REACH_X)).min(1)
 }
 
 /// Copies from column `x0` on; beyond the ends the border pixel is repeated.
