@@ -46,7 +46,7 @@ impl Coarse {
                 p2: stereo.p2.clamp(stereo.p1, 100) as u8,
             },
             method: Method::FourPaths,
-            context: 8,
+            context: 4,
             uniqueness_ratio: 0,
             search: lo / CELL..hi.div_ceil(CELL) + 1,
         };

@@ -17,10 +17,10 @@ const MERGE: usize = 24;
 const FULL_FRAME_FROM: f32 = 0.6;
 
 /// Pixels around a tile whose coarse disparities count for its range.
-const REACH: usize = 16;
+const REACH: usize = 12;
 
 /// Pixels by which the range exceeds the coarse disparities.
-const SLACK: f32 = 6.0;
+const SLACK: f32 = 4.0;
 
 /// A tile of 32 columns and the rows of its band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
