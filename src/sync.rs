@@ -30,16 +30,17 @@
 //! is dropped and counted, and the next pair says so.
 
 mod count;
+mod infos;
+mod stream;
 
 use std::collections::VecDeque;
 
 pub use count::{Counts, Gaps, SideCounts};
+use infos::{Found, Infos};
+use stream::Stream;
 
 use crate::config::{CameraInfoPolicy, Config, Input, SyncMode};
 use crate::stamp::Stamp;
-
-/// Intervals remembered per camera for the shortcut of rule 3.
-const INTERVALS: usize = 8;
 
 /// One of the two cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,22 +128,6 @@ pub struct Synchronizer<T, C> {
     after_jump: bool,
     stamps_differ: bool,
     counts: Counts,
-}
-
-#[derive(Debug)]
-struct Stream<T> {
-    queue: VecDeque<(Stamp, T)>,
-    newest: Option<Stamp>,
-    intervals: VecDeque<i64>,
-    /// The newest stamp lies before the last jump back.
-    behind: bool,
-}
-
-#[derive(Debug)]
-struct Infos<C> {
-    fixed: Option<C>,
-    queue: VecDeque<(Stamp, C)>,
-    newest: Option<Stamp>,
 }
 
 #[derive(Debug)]
@@ -420,66 +405,6 @@ impl<T, C: Clone> Synchronizer<T, C> {
             if !passed_over {
                 self.counts.gaps.note(gap);
             }
-        }
-    }
-}
-
-impl<T> Stream<T> {
-    fn new() -> Self {
-        Self {
-            queue: VecDeque::new(),
-            newest: None,
-            intervals: VecDeque::with_capacity(INTERVALS),
-            behind: false,
-        }
-    }
-
-    fn restart(&mut self) {
-        self.newest = None;
-        self.behind = false;
-    }
-
-    fn note(&mut self, stamp: Stamp) {
-        if let Some(newest) = self.newest {
-            if self.intervals.len() == INTERVALS {
-                self.intervals.pop_front();
-            }
-            self.intervals.push_back(stamp.0.saturating_sub(newest.0));
-        }
-        self.newest = Some(stamp);
-    }
-
-    fn leaves_no_room(&self, gap: u64) -> bool {
-        self.intervals
-            .iter()
-            .min()
-            .is_some_and(|shortest| gap.saturating_mul(4) <= shortest.unsigned_abs())
-    }
-}
-
-enum Found<C> {
-    Info(C),
-    NotYet,
-    Never,
-}
-
-impl<C: Clone> Infos<C> {
-    const fn new() -> Self {
-        Self { fixed: None, queue: VecDeque::new(), newest: None }
-    }
-
-    fn find(&self, stamp: Stamp, settings: &Settings) -> Found<C> {
-        if let Some(info) = &self.fixed {
-            return Found::Info(info.clone());
-        }
-        let hit = match settings.camera_info {
-            CameraInfoPolicy::Cached => self.queue.back(),
-            CameraInfoPolicy::Synced => self.queue.iter().find(|(of, _)| *of == stamp),
-        };
-        match hit {
-            Some((_, info)) => Found::Info(info.clone()),
-            None if self.newest.is_some_and(|newest| newest > stamp) => Found::Never,
-            None => Found::NotYet,
         }
     }
 }
