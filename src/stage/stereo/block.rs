@@ -3,7 +3,7 @@
 use crate::simd::prelude::*;
 use crate::simd::{LANES, Simd, abs_diff, load};
 use crate::stage::stereo::census::Census;
-use crate::stage::stereo::cost::{MAX_COST, descriptors, hamming};
+use crate::stage::stereo::cost::{MAX_COST, cost, descriptors};
 use crate::stage::stereo::volume::{RunShape, Volume};
 
 /// What is summed.
@@ -11,7 +11,7 @@ use crate::stage::stereo::volume::{RunShape, Volume};
 pub enum Measure {
     /// Absolute differences of gray values, cut at [`MAX_COST`].
     Absolute,
-    /// Hamming distances of census descriptors.
+    /// Distances of descriptors.
     Census,
 }
 
@@ -21,11 +21,11 @@ pub const RADIUS: usize = 4;
 /// Columns of a tile with the blocks' overhang, in whole vectors.
 const WIDE: usize = 3 * LANES;
 
-/// Sum of a block to a byte: 8 times the mean cost, at most 255.
+/// Sum of a block to a byte: 8 times the mean cost.
 const fn to_byte(sum: u16) -> u8 {
     const AREA: u32 = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as u32;
-    let mean = (sum as u32 * 8 + AREA / 2) / AREA;
-    if mean > 255 { 255 } else { mean as u8 }
+    const { assert!(8 * MAX_COST as u32 <= 255) };
+    ((sum as u32 * 8 + AREA / 2) / AREA) as u8
 }
 
 /// Fills the rows of `volume` with the mean cost of the block around each
@@ -98,7 +98,7 @@ fn row_costs<S: Simd>(
             Measure::Census => {
                 let l = descriptors(simd, left.planes(row), left.stride(), x);
                 let r = descriptors(simd, right.planes(row), right.stride(), partner);
-                hamming(&l, &r)
+                cost(&l, &r)
             }
             Measure::Absolute => {
                 let l = load(simd, left.gray(row), LANES + x);

@@ -1,26 +1,27 @@
-//! The census transform: which pixels of a window are brighter than its centre.
+//! What a pixel is recognised by: the census of its surroundings and its gradient.
 
 use crate::image::Image;
 use crate::simd::prelude::*;
 use crate::simd::{LANES, Simd, load, store, u8x32};
 
 /// Columns of context on either side of a pixel.
-pub const REACH_X: usize = 4;
+pub const REACH_X: usize = 3;
 /// Rows of context on either side of a pixel.
 pub const REACH_Y: usize = 3;
 
-/// Byte planes of a descriptor.
+/// Byte planes of a descriptor: three of census bits, and the horizontal Sobel
+/// gradient, cut to -63..=63 and quantised to 0..=31.
 pub const PLANES: usize = 4;
 
-/// Offsets (dx, dy) of the 9x7 window's pixels in reading order: bit k is set
+/// Offsets (dx, dy) of the 7x7 window's pixels in reading order: bit k is set
 /// where the pixel at offset k is brighter than the centre (Zabih and Woodfill
-/// 1994). Of the window, seen as a chessboard, the 32 squares are taken whose
-/// colour is not that of the centre: they fill four bytes.
-pub const OFFSETS: [(isize, isize); 32] = {
-    let mut offsets = [(0, 0); 32];
+/// 1994). Of the window, seen as a chessboard, the 24 squares are taken whose
+/// colour is not that of the centre: they fill three bytes.
+pub const OFFSETS: [(isize, isize); 24] = {
+    let mut offsets = [(0, 0); 24];
     let (mut k, mut i) = (0, 0);
-    while k < 32 {
-        let (dx, dy) = (i % 9 - 4, i / 9 - 3);
+    while k < 24 {
+        let (dx, dy) = (i % 7 - 3, i / 7 - 3);
         if (dx + dy) % 2 != 0 {
             offsets[k] = (dx, dy);
             k += 1;
@@ -77,14 +78,16 @@ impl Census {
             let gray = &self.gray[i * self.gray_stride..(i + 2 * REACH_Y + 1) * self.gray_stride];
             let (first, rest) = planes.split_at_mut(self.stride);
             let (second, rest) = rest.split_at_mut(self.stride);
-            let (third, fourth) = rest.split_at_mut(self.stride);
+            let (third, gradients) = rest.split_at_mut(self.stride);
             for x in (0..self.stride).step_by(LANES) {
                 let window = window(gray, self.gray_stride, LANES + x - REACH_X);
                 store(first, x, plane!(simd, &window, 7 6 5 4 3 2 1 0));
                 store(second, x, plane!(simd, &window, 15 14 13 12 11 10 9 8));
                 store(third, x, plane!(simd, &window, 23 22 21 20 19 18 17 16));
-                store(fourth, x, plane!(simd, &window, 31 30 29 28 27 26 25 24));
             }
+            let rows = [REACH_Y - 1, REACH_Y, REACH_Y + 1]
+                .map(|row| &gray[row * self.gray_stride + LANES - 1..][..self.stride + 2]);
+            gradient_row(rows, gradients);
         }
     }
 
@@ -132,6 +135,17 @@ fn brighter<S: Simd, const BIT: usize>(simd: S, window: &Window<'_>) -> u8x32<S>
     let (x, y) = ((REACH_X as isize + dx) as usize, (REACH_Y as isize + dy) as usize);
     let pixel = load(simd, window[y], x);
     pixel.saturating_sub(load(simd, window[REACH_Y], REACH_X)).min(1)
+}
+
+/// Gradients of the middle one of three rows, which begin one column earlier.
+#[inline(always)]
+fn gradient_row([above, here, below]: [&[u8]; 3], out: &mut [u8]) {
+    let windows = above.windows(3).zip(here.windows(3)).zip(below.windows(3));
+    for (out, ((a, b), c)) in out.iter_mut().zip(windows) {
+        let rise = |w: &[u8]| w[2] as i16 - w[0] as i16;
+        let sobel = rise(a) + 2 * rise(b) + rise(c);
+        *out = ((sobel.clamp(-63, 63) + 63) / 4) as u8;
+    }
 }
 
 /// Copies from column `x0` on; beyond the ends the border pixel is repeated.

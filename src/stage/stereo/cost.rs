@@ -1,11 +1,15 @@
-//! The matching cost: how many bits of two census descriptors differ.
+//! The matching cost: how far two descriptors differ.
 
 use crate::simd::prelude::*;
-use crate::simd::{Block, LANES, Simd, load, load_block, u8x32};
-use crate::stage::stereo::census::PLANES;
+use crate::simd::{Block, LANES, Simd, abs_diff, load, load_block, u8x32};
+use crate::stage::stereo::census::{OFFSETS, PLANES};
 
-/// Largest cost of one pixel: all 32 bits differ.
-pub const MAX_COST: u8 = 32;
+/// The difference of gradients counts up to here: a quarter of what the census
+/// may say, so that one strong edge cannot outvote the surroundings.
+pub const MAX_GRADIENT_COST: u8 = 6;
+
+/// Largest cost of one pixel: all bits differ, and the gradients as well.
+pub const MAX_COST: u8 = OFFSETS.len() as u8 + MAX_GRADIENT_COST;
 
 /// One byte of 32 descriptors per plane.
 pub type Descriptors<S> = [u8x32<S>; PLANES];
@@ -21,11 +25,12 @@ pub fn descriptors<S: Simd>(simd: S, planes: &[u8], stride: usize, at: usize) ->
     ]
 }
 
-/// Hamming distance of 32 pairs of descriptors.
+/// Cost of 32 pairs of descriptors: the Hamming distance of the census plus the
+/// difference of the gradients.
 #[inline(always)]
-pub fn hamming<S: Simd>(a: &Descriptors<S>, b: &Descriptors<S>) -> u8x32<S> {
+pub fn cost<S: Simd>(a: &Descriptors<S>, b: &Descriptors<S>) -> u8x32<S> {
     ((a[0] ^ b[0]).count_ones() + (a[1] ^ b[1]).count_ones())
-        + ((a[2] ^ b[2]).count_ones() + (a[3] ^ b[3]).count_ones())
+        + ((a[2] ^ b[2]).count_ones() + abs_diff(a[3], b[3]).min(MAX_GRADIENT_COST))
 }
 
 /// Penalties of a disparity step between two pixels.

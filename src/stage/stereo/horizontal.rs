@@ -6,7 +6,7 @@
 use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, abs_diff, load_block, transpose, transpose_every, u8x32};
 use crate::stage::stereo::census::{Census, PLANES};
-use crate::stage::stereo::cost::{Descriptors, Penalties, PenaltyLanes, hamming};
+use crate::stage::stereo::cost::{Descriptors, Penalties, PenaltyLanes, cost};
 use crate::stage::stereo::volume::{RunShape, Seeds, Volume};
 
 /// State of the horizontal paths.
@@ -125,7 +125,7 @@ impl Horizontal {
             let larger = entering(simd, &state[i + 2], floor, p2);
             let descriptor = &right[n - 1 - i];
             let right = load_descriptors(simd, descriptor);
-            let cost = hamming(left, &right) + same.min(smaller.min(larger) + p1);
+            let cost = cost(left, &right) + same.min(smaller.min(larger) + p1);
             cost.store_array(&mut state[i + 1]);
             least = least.min(cost);
             smaller = same;

@@ -3,7 +3,7 @@
 use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, abs_diff, load, load_block, store, u8x32};
 use crate::stage::stereo::census::{Census, PLANES};
-use crate::stage::stereo::cost::{Penalties, PenaltyLanes, descriptors, hamming};
+use crate::stage::stereo::cost::{Penalties, PenaltyLanes, cost, descriptors};
 use crate::stage::stereo::engine::Finish;
 use crate::stage::stereo::plan::Tile;
 use crate::stage::stereo::volume::{RunShape, Seeds, Volume};
@@ -226,7 +226,7 @@ impl Vertical {
 
         if !DIAGONALS {
             for ((sum, partner), next) in sums.iter_mut().zip(partners).zip(slots) {
-                let cost = hamming(&l, &descriptors(simd, partner, right.stride(), 0));
+                let cost = cost(&l, &descriptors(simd, partner, right.stride(), 0));
                 let s_larger = entering(simd, next, s_at, s_floor, s_p2);
                 let s = cost + s_same.min(s_smaller.min(s_larger) + p1);
                 store(here, s_at, s);
@@ -258,7 +258,7 @@ impl Vertical {
         let mut r_least = u8x32::splat(simd, 255);
 
         for ((sum, partner), next) in sums.iter_mut().zip(partners).zip(slots) {
-            let cost = hamming(&l, &descriptors(simd, partner, right.stride(), 0));
+            let cost = cost(&l, &descriptors(simd, partner, right.stride(), 0));
 
             let s_larger = entering(simd, next, s_at, s_floor, s_p2);
             let s = cost + s_same.min(s_smaller.min(s_larger) + p1);

@@ -14,19 +14,24 @@ use salient_stereo::stage::stereo::{Matches, NO_MATCH};
 
 type Point = (isize, isize);
 
-/// Census of every second pixel of 9x7 against the centre.
-pub fn census(image: &Image<u8>, x: isize, y: isize) -> u32 {
+/// Census of every second pixel of 7x7 against the centre; the quantised
+/// gradient in the upper byte.
+pub fn descriptor(image: &Image<u8>, x: isize, y: isize) -> u32 {
     let (mut bits, mut k) = (0, 0);
+    let at = |dx, dy| i32::from(image.get_clamped(x + dx, y + dy));
     for dy in -3..=3 {
-        for dx in -4..=4 {
+        for dx in -3..=3 {
             if (dx + dy) % 2 != 0 {
-                let brighter = image.get_clamped(x + dx, y + dy) > image.get_clamped(x, y);
-                bits |= u32::from(brighter) << k;
+                bits |= u32::from(at(dx, dy) > at(0, 0)) << k;
                 k += 1;
             }
         }
     }
-    bits
+    let sobel: i32 = [(-1, 1), (0, 2), (1, 1)]
+        .map(|(dy, weight)| weight * (at(1, dy) - at(-1, dy)))
+        .iter()
+        .sum();
+    bits | ((sobel.clamp(-63, 63) + 63) as u32 / 4) << 24
 }
 
 /// One run of one band.
@@ -36,8 +41,8 @@ struct Domain<'a> {
     plan: &'a Plan,
     band: &'a Band,
     run: &'a Run,
-    /// Census of every left and right pixel that is looked at.
-    census: HashMap<(bool, isize, isize), u32>,
+    /// Descriptor of every left and right pixel that is looked at.
+    descriptors: HashMap<(bool, isize, isize), u32>,
     rows: (isize, isize),
 }
 
@@ -60,15 +65,15 @@ impl<'a> Domain<'a> {
         let above = settings.context.min(band.y0);
         let below = settings.context.min(height - band.y1);
         let rows = ((band.y0 - above) as isize, (band.y1 + below) as isize);
-        let mut census = HashMap::new();
+        let mut descriptors = HashMap::new();
         let (x0, x1) = (run.x0 as isize, run.x0 as isize + 32 * run.tiles.len() as isize);
         for y in rows.0..rows.1 {
             for x in x0 - run.hi as isize - 40..x1 + 40 {
-                census.insert((false, x, y), super::stereo::census(views.left, x, y));
-                census.insert((true, x, y), super::stereo::census(views.right, x, y));
+                descriptors.insert((false, x, y), descriptor(views.left, x, y));
+                descriptors.insert((true, x, y), descriptor(views.right, x, y));
             }
         }
-        Self { views, settings, plan, band, run, census, rows }
+        Self { views, settings, plan, band, run, descriptors, rows }
     }
 
     fn columns(&self) -> (isize, isize) {
@@ -82,9 +87,10 @@ impl<'a> Domain<'a> {
     }
 
     fn cost(&self, x: isize, y: isize, d: usize) -> u8 {
-        let a = self.census[&(false, x, y)];
-        let b = self.census[&(true, x - d as isize, y)];
-        (a ^ b).count_ones() as u8
+        let a = self.descriptors[&(false, x, y)];
+        let b = self.descriptors[&(true, x - d as isize, y)];
+        let gradients = ((a >> 24).abs_diff(b >> 24)).min(6);
+        (((a ^ b) << 8).count_ones() + gradients) as u8
     }
 
     fn gray(&self, (x, y): Point) -> u8 {
@@ -236,7 +242,7 @@ impl<'a> Domain<'a> {
             }
         }
         let area = (2 * RADIUS as u32 + 1).pow(2);
-        ((8 * sum + area / 2) / area).min(255) as u8
+        ((8 * sum + area / 2) / area) as u8
     }
 }
 
