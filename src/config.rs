@@ -118,6 +118,15 @@ choice!(
         CensusBlock,
     }
 );
+choice!(
+    /// What becomes of holes in the disparity.
+    Fill {
+        /// They stay.
+        Off,
+        /// Those inside the region of interest take a neighbour's disparity, with less confidence.
+        Roi,
+    }
+);
 
 /// Encoding of the published depth image (REP 118).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -229,6 +238,7 @@ group!(
         disp12_max_diff: i64 = 1,
         speckle_size: i64 = 100,
         speckle_range: f64 = 2.0,
+        fill: Fill = Fill::Off,
         saliency_weight: f64 = 0.0,
     }
 );

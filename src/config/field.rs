@@ -193,6 +193,11 @@ pub const FIELDS: &[Field] = &[
         "Largest disparity step inside one patch, in pixels.",
     ),
     live(
+        "stereo.fill",
+        Choice(&["off", "roi"]),
+        "Whether holes inside the region of interest take a neighbour's disparity, with confidence 0.5.",
+    ),
+    live(
         "stereo.saliency_weight",
         Real(0.0, 4.0),
         "Lambda of eq. 6: how much more the matching cost counts where saliency is high; 0 switches it off.",

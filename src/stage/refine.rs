@@ -2,20 +2,27 @@
 
 pub mod median;
 pub mod speckle;
+pub mod trust;
 
 use std::ops::Range;
 
 use crate::camera::StereoRig;
-use crate::config::Config;
+use crate::config::{Config, Fill};
 use crate::image::{Image, Size};
 use crate::perception::{DISPARITY_STEP, RoiMask};
 use crate::simd::{self, Level, Simd, dispatch};
+use crate::stage::coarse::fill_row;
 use crate::stage::refine::median::median_row;
 use crate::stage::refine::speckle::Speckles;
+use crate::stage::refine::trust::Trust;
 use crate::stage::stereo::winner::STEPS;
 use crate::stage::stereo::{Matches, NO_MATCH};
 
-/// Left-right check, median, speckle filter, confidence.
+/// Confidence of a disparity that was not measured but taken from beside a
+/// hole: less than any measured one has.
+pub const FILLED: f32 = 0.5;
+
+/// Left-right check, median, speckle filter, confidence, fill.
 pub struct Refine {
     level: Level,
     size: Size,
@@ -23,11 +30,15 @@ pub struct Refine {
     speckle_size: usize,
     speckle_range: i32,
     min_confidence: f32,
+    fill: bool,
     checked: Image<i16>,
+    /// Evidence of what passed the check, else 0.
+    evidence: Image<u8>,
     smooth: Image<i16>,
     /// A row without any match.
     outside: Vec<i16>,
     speckles: Speckles,
+    trust: Trust,
 }
 
 impl Refine {
@@ -47,10 +58,13 @@ impl Refine {
             speckle_size: stereo.speckle_size.max(0) as usize,
             speckle_range: (stereo.speckle_range * f64::from(STEPS)) as i32,
             min_confidence: config.min_confidence as f32,
+            fill: stereo.fill == Fill::Roi && config.min_confidence <= f64::from(FILLED),
             checked: Image::default(),
+            evidence: Image::default(),
             smooth: Image::default(),
             outside: Vec::new(),
             speckles: Speckles::default(),
+            trust: Trust::default(),
         }
     }
 
@@ -70,9 +84,11 @@ impl Refine {
         confidence.fill(0.0);
         let area = Area::of(&roi.matched);
         self.checked.resize(self.size);
+        self.evidence.resize(self.size);
         self.smooth.resize(self.size);
         for y in area.rows.clone() {
-            check_row(matches, y, self.max_difference, &area, self.checked.row_mut(y));
+            let (checked, evidence) = (self.checked.row_mut(y), self.evidence.row_mut(y));
+            check_row(matches, y, self.max_difference, &area, checked, evidence);
         }
         self.outside.resize(self.size.width, NO_MATCH);
         let (checked, outside, smooth) = (&self.checked, &self.outside[..], &mut self.smooth);
@@ -80,26 +96,42 @@ impl Refine {
         if self.speckle_size > 1 {
             self.speckles.remove(&mut self.smooth, &area, self.speckle_size, self.speckle_range);
         }
+        let (evidence, trust) = (&self.evidence, &mut self.trust);
+        dispatch!(self.level, simd => trust.run(simd, evidence, &area, confidence));
         let offset = rig.disparity_offset() as f32;
         let columns = area.columns.clone();
         for y in area.rows {
-            let evidence = &matches.evidence.row(y)[columns.clone()];
-            let raw = &matches.left.row(y)[columns.clone()];
             let smooth = &self.smooth.row(y)[columns.clone()];
             let disparity = &mut disparity.row_mut(y)[columns.clone()];
             let confidence = &mut confidence.row_mut(y)[columns.clone()];
-            for (x, (d, c)) in disparity.iter_mut().zip(confidence).enumerate() {
-                if smooth[x] == NO_MATCH {
-                    continue;
-                }
-                let moved = (i32::from(raw[x]) - i32::from(smooth[x])).abs();
-                let value = trust(evidence[x], moved);
-                if value >= self.min_confidence {
-                    *d = f32::from(smooth[x]) * DISPARITY_STEP - offset;
-                    *c = value;
+            for ((d, c), &smooth) in disparity.iter_mut().zip(&mut *confidence).zip(smooth) {
+                if smooth != NO_MATCH && *c >= self.min_confidence {
+                    *d = f32::from(smooth) * DISPARITY_STEP - offset;
+                } else {
+                    *c = 0.0;
                 }
             }
+            if self.fill {
+                fill(&roi.matched.row(y)[columns.clone()], disparity, confidence);
+            }
         }
+    }
+}
+
+/// Fills the holes of a row of the region with the smaller of the disparities
+/// beside them, as what one view does not see lies behind. Nothing is taken
+/// across a gap between regions.
+fn fill(matched: &[u8], disparity: &mut [f32], confidence: &mut [f32]) {
+    let mut x = 0;
+    for span in matched.chunk_by(|a, b| (*a == 0) == (*b == 0)) {
+        let end = x + span.len();
+        if span[0] != 0 && fill_row(&mut disparity[x..end]) {
+            for c in &mut confidence[x..end] {
+                // What has no confidence so far has been filled.
+                *c = if *c == 0.0 { FILLED } else { *c };
+            }
+        }
+        x = end;
     }
 }
 
@@ -159,45 +191,31 @@ fn median<S: Simd>(
     }
 }
 
-/// Confidence from the evidence of the cost curve; halved where the median
-/// took the disparity from elsewhere.
-fn trust(evidence: u8, moved: i32) -> f32 {
-    let trust = 0.4 + 0.6 * (f32::from(evidence) / 255.0).sqrt();
-    if moved > STEPS { 0.5 * trust } else { trust }
-}
-
-/// Drops disparities that are not unique or that the right view contradicts.
+/// Drops disparities that are not unique or that the right view contradicts,
+/// and their evidence.
 fn check_row(
     matches: &Matches,
     y: usize,
     max_difference: Option<i32>,
     area: &Area,
     out: &mut [i16],
+    kept: &mut [u8],
 ) {
     let left = matches.left.row(y);
     let right = matches.right.row(y);
     let evidence = matches.evidence.row(y);
-    for (x, (out, &d)) in
-        out.iter_mut().zip(left).enumerate().take(area.columns.end).skip(area.columns.start)
-    {
-        *out = NO_MATCH;
-        if d == NO_MATCH || evidence[x] == 0 {
-            continue;
-        }
-        let Some(max_difference) = max_difference else {
-            *out = d;
-            continue;
-        };
-        let partner = x as i32 - ((i32::from(d) + STEPS / 2) >> STEPS.trailing_zeros());
-        // A partner outside the right image can neither agree nor contradict.
-        let agreed = match usize::try_from(partner) {
-            Ok(x) => {
-                (i32::from(right[x.min(right.len() - 1)]) - i32::from(d)).abs() <= max_difference
-            }
-            Err(_) => true,
-        };
-        if agreed {
-            *out = d;
-        }
+    for x in area.columns.clone() {
+        let d = left[x];
+        let agreed = d != NO_MATCH
+            && evidence[x] != 0
+            && max_difference.is_none_or(|most| {
+                let partner = x as i32 - ((i32::from(d) + STEPS / 2) >> STEPS.trailing_zeros());
+                // A partner outside the right image can neither agree nor contradict.
+                usize::try_from(partner).map_or(true, |x| {
+                    let there = right[x.min(right.len() - 1)];
+                    (i32::from(there) - i32::from(d)).abs() <= most
+                })
+            });
+        (out[x], kept[x]) = if agreed { (d, evidence[x]) } else { (NO_MATCH, 0) };
     }
 }

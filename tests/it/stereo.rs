@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use proptest::prelude::*;
 use salient_stereo::camera::{Camera, StereoRig};
-use salient_stereo::config::Config;
+use salient_stereo::config::{Config, Fill};
 use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::{RoiMask, View};
 use salient_stereo::simd::{self, Level};
@@ -186,12 +186,15 @@ proptest! {
         seed: u64,
         speckle_size in 0_i64..40,
         max_difference in -1_i64..3,
+        fill: bool,
     ) {
         let size = Size::new(width, height);
         let matches = random_matches(size, seed);
         let mut noise = Noise(seed ^ 7);
         let (x0, y0) = (noise.next() as usize % width, noise.next() as usize % height);
-        let matched = Image::from_fn(size, |x, y| if x >= x0 && y >= y0 { 255 } else { 0 });
+        let matched = Image::from_fn(size, |x, y| {
+            if x >= x0 && y >= y0 && x % 31 != 7 { 255 } else { 0 }
+        });
         let mut matches = matches;
         for (d, &m) in matches.left.pixels_mut().iter_mut().zip(matched.pixels()) {
             if m == 0 {
@@ -201,20 +204,21 @@ proptest! {
         let mut config = Config::default();
         config.stereo.speckle_size = speckle_size;
         config.stereo.disp12_max_diff = max_difference;
-        config.min_confidence = 0.5;
-        let expected = plain::refined(&matches, &config);
+        if fill {
+            config.stereo.fill = Fill::Roi;
+        } else {
+            config.min_confidence = 0.9;
+        }
+        let (expected, trusted) = plain::refined(&matches, &matched, &config);
         for level in simd::available() {
             let mut refine = Refine::with_level(&config, size, level);
             let roi = RoiMask { salient: matched.clone(), matched: matched.clone(), fraction: 0.5 };
             let (mut disparity, mut confidence) = (Image::default(), Image::default());
             refine.run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
-            for ((d, c), e) in
-                disparity.pixels().iter().zip(confidence.pixels()).zip(expected.pixels())
-            {
+            prop_assert_eq!(confidence.pixels(), trusted.pixels());
+            for (d, e) in disparity.pixels().iter().zip(expected.pixels()) {
                 // The rig's principal points are 2 px apart.
-                let e = if *c < 0.5 { f32::NAN } else { *e - 2.0 };
-                prop_assert!(*d == e || (d.is_nan() && e.is_nan()), "{d} {e}");
-                prop_assert_eq!(*c == 0.0, d.is_nan());
+                prop_assert!(*d == *e - 2.0 || (d.is_nan() && e.is_nan()), "{d} {e}");
             }
         }
     }
@@ -234,8 +238,10 @@ fn random_matches(size: Size, seed: u64) -> Matches {
         })
     };
     let (left, right) = (image(), image());
-    let evidence =
-        Image::from_fn(size, |_, _| if noise.next().is_multiple_of(8) { 0 } else { 128 });
+    let evidence = Image::from_fn(size, |_, _| match noise.next() % 16 {
+        0 | 1 => 0,
+        _ => (noise.next() >> 56) as u8,
+    });
     Matches { left, right, evidence }
 }
 

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use salient_stereo::config::Config;
+use salient_stereo::config::{Config, Fill};
 use salient_stereo::image::{Image, Size};
 use salient_stereo::stage::coarse::CELL;
 use salient_stereo::stage::stereo::block::{Measure, RADIUS};
@@ -345,8 +345,13 @@ fn winner(
     Some((32 * best as i16 + offset as i16, evidence))
 }
 
-/// Left-right check, median and speckle filter; pixels in px, NaN where none.
-pub fn refined(matches: &Matches, config: &Config) -> Image<f32> {
+/// Left-right check, median, speckle filter, confidence and fill: disparity in
+/// px, NaN where none, and its confidence.
+pub fn refined(
+    matches: &Matches,
+    matched: &Image<u8>,
+    config: &Config,
+) -> (Image<f32>, Image<f32>) {
     let size = matches.left.size();
     let checked = Image::from_fn(size, |x, y| {
         let d = matches.left.get(x, y);
@@ -384,10 +389,42 @@ pub fn refined(matches: &Matches, config: &Config) -> Image<f32> {
     });
     let patches = patches(&smooth, (config.stereo.speckle_range * 32.0) as i32);
     let least = config.stereo.speckle_size as usize;
-    Image::from_fn(size, |x, y| {
+    let trust = |x: usize, y: usize| {
+        let mut sum = 0;
+        for v in y.saturating_sub(4)..(y + 5).min(size.height) {
+            for u in x.saturating_sub(4)..(x + 5).min(size.width) {
+                if checked.get(u, v) != NO_MATCH {
+                    sum += u32::from(matches.evidence.get(u, v));
+                }
+            }
+        }
+        1.0 - 1.0 / 3.0 * (-((sum / 81) as f32) * (1.0 / 33.0)).exp()
+    };
+    let valid = |x: usize, y: usize| {
         let d = smooth.get(x, y);
-        if d == NO_MATCH || patches.get(x, y) < least { f32::NAN } else { f32::from(d) / 32.0 }
-    })
+        d != NO_MATCH && patches.get(x, y) >= least && trust(x, y) >= config.min_confidence as f32
+    };
+    let measured = |x, y| f32::from(smooth.get(x, y)) / 32.0;
+    let mut disparity = Image::filled(size, f32::NAN);
+    let mut confidence = Image::new(size);
+    for y in 0..size.height {
+        for x in 0..size.width {
+            if valid(x, y) {
+                disparity.set(x, y, measured(x, y));
+                confidence.set(x, y, trust(x, y));
+            } else if config.stereo.fill == Fill::Roi && matched.get(x, y) != 0 {
+                let inside = |&x: &usize| matched.get(x, y) != 0;
+                let left = (0..x).rev().take_while(inside).find(|&x| valid(x, y));
+                let right = (x + 1..size.width).take_while(inside).find(|&x| valid(x, y));
+                let beside = left.into_iter().chain(right).map(|x| measured(x, y));
+                if let Some(d) = beside.reduce(f32::min) {
+                    disparity.set(x, y, d);
+                    confidence.set(x, y, 0.5);
+                }
+            }
+        }
+    }
+    (disparity, confidence)
 }
 
 /// Size of the patch around each pixel, by flooding it.
