@@ -236,8 +236,8 @@ group!(
         p2: i64 = 80,
         uniqueness_ratio: i64 = 5,
         disp12_max_diff: i64 = 1,
-        speckle_size: i64 = 100,
-        speckle_range: f64 = 2.0,
+        speckle_size: i64 = 150,
+        speckle_range: f64 = 1.0,
         fill: Fill = Fill::Off,
         saliency_weight: f64 = 0.0,
     }
