@@ -6,6 +6,8 @@ pub mod trust;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::camera::StereoRig;
 use crate::config::{Config, Fill};
 use crate::image::{Image, Size};
@@ -21,6 +23,9 @@ use crate::stage::stereo::{Matches, NO_MATCH};
 /// Confidence of a disparity that was not measured but taken from beside a
 /// hole: less than any measured one has.
 pub const FILLED: f32 = 0.5;
+
+/// Least rows that are worth a task of their own.
+const ROWS_AT_ONCE: usize = 32;
 
 /// Left-right check, median, speckle filter, confidence, fill.
 pub struct Refine {
@@ -86,13 +91,24 @@ impl Refine {
         self.checked.resize(self.size);
         self.evidence.resize(self.size);
         self.smooth.resize(self.size);
-        for y in area.rows.clone() {
-            let (checked, evidence) = (self.checked.row_mut(y), self.evidence.row_mut(y));
-            check_row(matches, y, self.max_difference, &area, checked, evidence);
-        }
+        // Rows are independent of each other in all but the speckle filter and
+        // the sums of the confidence.
+        let width = self.size.width.max(1);
+        let (first, most) = (area.rows.start, self.max_difference);
+        let within = area.rows.start * width..area.rows.end * width;
+        let checked = self.checked.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
+        let evidence = self.evidence.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
+        checked.zip(evidence).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
+            |(i, (checked, evidence))| {
+                check_row(matches, first + i, most, &area, checked, evidence);
+            },
+        );
         self.outside.resize(self.size.width, NO_MATCH);
-        let (checked, outside, smooth) = (&self.checked, &self.outside[..], &mut self.smooth);
-        dispatch!(self.level, simd => median(simd, checked, outside, &area, smooth));
+        let (level, checked, outside) = (self.level, &self.checked, &self.outside[..]);
+        let smooth = self.smooth.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
+        smooth.enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(i, smooth)| {
+            dispatch!(level, simd => median(simd, checked, outside, &area, first + i, smooth));
+        });
         if self.speckle_size > 1 {
             self.speckles.remove(&mut self.smooth, &area, self.speckle_size, self.speckle_range);
         }
@@ -100,21 +116,27 @@ impl Refine {
         dispatch!(self.level, simd => trust.run(simd, evidence, &area, confidence));
         let offset = rig.disparity_offset() as f32;
         let columns = area.columns.clone();
-        for y in area.rows {
-            let smooth = &self.smooth.row(y)[columns.clone()];
-            let disparity = &mut disparity.row_mut(y)[columns.clone()];
-            let confidence = &mut confidence.row_mut(y)[columns.clone()];
-            for ((d, c), &smooth) in disparity.iter_mut().zip(&mut *confidence).zip(smooth) {
-                if smooth != NO_MATCH && *c >= self.min_confidence {
-                    *d = f32::from(smooth) * DISPARITY_STEP - offset;
-                } else {
-                    *c = 0.0;
+        let (smooth, least, fills) = (&self.smooth, self.min_confidence, self.fill);
+        let disparity = disparity.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
+        let confidence = confidence.pixels_mut()[within].par_chunks_exact_mut(width);
+        disparity.zip(confidence).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
+            |(i, (disparity, confidence))| {
+                let y = first + i;
+                let smooth = &smooth.row(y)[columns.clone()];
+                let disparity = &mut disparity[columns.clone()];
+                let confidence = &mut confidence[columns.clone()];
+                for ((d, c), &smooth) in disparity.iter_mut().zip(&mut *confidence).zip(smooth) {
+                    if smooth != NO_MATCH && *c >= least {
+                        *d = f32::from(smooth) * DISPARITY_STEP - offset;
+                    } else {
+                        *c = 0.0;
+                    }
                 }
-            }
-            if self.fill {
-                fill(&roi.matched.row(y)[columns.clone()], disparity, confidence);
-            }
-        }
+                if fills {
+                    fill(&roi.matched.row(y)[columns.clone()], disparity, confidence);
+                }
+            },
+        );
     }
 }
 
@@ -175,20 +197,19 @@ fn median<S: Simd>(
     checked: &Image<i16>,
     outside: &[i16],
     area: &Area,
-    smooth: &mut Image<i16>,
+    y: usize,
+    smooth: &mut [i16],
 ) {
     let (rows, columns) = (&area.rows, &area.columns);
-    for y in rows.clone() {
-        let above = if y > rows.start { checked.row(y - 1) } else { outside };
-        let below = if y + 1 < rows.end { checked.row(y + 1) } else { outside };
-        median_row(
-            simd,
-            &above[columns.clone()],
-            &checked.row(y)[columns.clone()],
-            &below[columns.clone()],
-            &mut smooth.row_mut(y)[columns.clone()],
-        );
-    }
+    let above = if y > rows.start { checked.row(y - 1) } else { outside };
+    let below = if y + 1 < rows.end { checked.row(y + 1) } else { outside };
+    median_row(
+        simd,
+        &above[columns.clone()],
+        &checked.row(y)[columns.clone()],
+        &below[columns.clone()],
+        &mut smooth[columns.clone()],
+    );
 }
 
 /// Drops disparities that are not unique or that the right view contradicts,
