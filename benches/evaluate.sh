@@ -7,7 +7,8 @@
 #   kitti2012/  kitti2015/  middlebury*/  sintel/  spring/  davis/  duts/DUTS-TR/
 # and our own bags are always measured. OPTIONs go to `salient_stereo evaluate` (--threads 1, --set …).
 # OpenCV's rows need a Python with opencv-python-headless and numpy: set PYTHON; without it they are left out.
-# Finished scenes are kept in out/evaluation: run it again after an interruption.
+# Finished scenes are kept in out/evaluation: run it again after an interruption. Exit code 3: everything was
+# written, and scenes that could not be read are named above.
 set -euo pipefail
 data=$(realpath "${1:?the folder with the data sets}")
 shift

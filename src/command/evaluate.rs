@@ -152,7 +152,11 @@ fn wanted_methods(names: &[String]) -> Result<Vec<&'static Method>, CommandError
             CommandError::Usage(format!("there is no method '{name}'; known: {}", known.join(", ")))
         })
     });
-    found.collect()
+    let mut found: Vec<_> = found.collect::<Result<_, _>>()?;
+    // In the order of the tables, each once.
+    found.sort_by_key(|found| METHODS.iter().position(|known| known.name == found.name));
+    found.dedup_by_key(|found| found.name);
+    Ok(found)
 }
 
 /// What all scenes of a run have in common.

@@ -2,35 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::method::METHODS;
+pub use super::method::{ABLATION, FULL_FRAME, OURS};
 use super::{Evaluation, Figures, Part, Peer, Run};
 
-/// The methods in the order of the tables, and what they are called there.
-const METHODS: [(&str, &str); 12] = [
-    (FULL_FRAME, "full-frame SGM"),
-    ("spectral_residual", "spectral residual"),
-    ("frequency_tuned", "frequency-tuned"),
-    ("paper", "paper's fusion"),
-    (OURS, "scene (ours)"),
-    ("centre", "baseline: centre"),
-    ("rows", "baseline: rows"),
-    ("c1", "c1: intensity"),
-    ("c2", "c2: + colour"),
-    ("c3", "c3: + orientation"),
-    ("c4", "c4: + depth and motion (the paper's fusion)"),
-    ("c5", "c5: + temporal smoothing and area budget"),
-];
-
-/// The method that all time is saved against.
-pub const FULL_FRAME: &str = "full_frame";
-
-/// What that method is called on the pairs of the peers alone.
+/// What the baseline is called on the pairs of the peers alone.
 const SAME_PAIRS: &str = "full-frame SGM on the peers' pairs";
-
-/// The method that is ours.
-pub const OURS: &str = "scene";
-
-/// The methods of the cue ablation.
-pub const ABLATION: [&str; 5] = ["c1", "c2", "c3", "c4", "c5"];
 
 /// One method on all scenes of one data set.
 #[derive(Clone, Debug)]
@@ -80,12 +57,12 @@ impl Merged {
 
 /// What a method is called in tables.
 pub fn label(method: &str) -> &str {
-    METHODS.iter().find(|(name, _)| *name == method).map_or(method, |(_, label)| label)
+    super::method::method(method).map_or(method, |known| known.label)
 }
 
 /// Where a method that is listed stands among the others.
 pub fn place(method: &str) -> Option<usize> {
-    METHODS.iter().position(|(name, _)| *name == method)
+    METHODS.iter().position(|known| known.name == method)
 }
 
 /// One of the others' matchers on all pairs of one data set.

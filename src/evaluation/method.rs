@@ -48,8 +48,8 @@ impl Prior {
 pub struct Method {
     /// Name on the command line and in files.
     pub name: &'static str,
-    /// What it is, in a few words.
-    pub about: &'static str,
+    /// What it is called in tables.
+    pub label: &'static str,
     /// What it does.
     pub work: Work,
     /// True when the picture of its best and worst frame is kept.
@@ -65,18 +65,18 @@ enum Setting {
 
 const fn pipeline(
     name: &'static str,
-    about: &'static str,
+    label: &'static str,
     settings: &'static [(&'static str, Setting)],
 ) -> Method {
-    Method { name, about, work: Work::Pipeline, is_shown: false, settings }
+    Method { name, label, work: Work::Pipeline, is_shown: false, settings }
 }
 
 const fn shown(method: Method) -> Method {
     Method { is_shown: true, ..method }
 }
 
-const fn prior(name: &'static str, about: &'static str, prior: Prior) -> Method {
-    Method { name, about, work: Work::Prior(prior), is_shown: false, settings: &[] }
+const fn prior(name: &'static str, label: &'static str, prior: Prior) -> Method {
+    Method { name, label, work: Work::Prior(prior), is_shown: false, settings: &[] }
 }
 
 use Setting::{Number, Word};
@@ -88,24 +88,21 @@ const MOTION: &str = "saliency.paper.motion";
 const MODE: &str = "saliency.mode";
 const SMOOTHING: &str = "saliency.temporal_smoothing";
 
-/// Every method, in the order of the tables.
+/// Every method, in the order of the tables: the baseline, attention by
+/// spectral residual (Hou and Zhang 2007), by frequency tuning (Achanta et al.
+/// 2009), by eq. 4 and by geometry; attention that never looks; the ablation of
+/// eq. 4, whose last step has an area budget of 40 %.
 pub const METHODS: &[Method] = &[
-    pipeline("full_frame", "matches everything: the baseline", &[(MODE, Word("full_frame"))]),
-    pipeline(
-        "spectral_residual",
-        "spectral residual (Hou and Zhang 2007)",
-        &[(MODE, Word("spectral_residual"))],
-    ),
-    pipeline(
-        "frequency_tuned",
-        "frequency-tuned saliency (Achanta et al. 2009)",
-        &[(MODE, Word("frequency_tuned"))],
-    ),
-    shown(pipeline("paper", "the linear fusion of five cues (eq. 4)", &[(MODE, Word("paper"))])),
-    shown(pipeline("scene", "geometry first: the default", &[(MODE, Word("scene"))])),
+    pipeline("full_frame", "full-frame SGM", &[(MODE, Word("full_frame"))]),
+    pipeline("spectral_residual", "spectral residual", &[(MODE, Word("spectral_residual"))]),
+    pipeline("frequency_tuned", "frequency-tuned", &[(MODE, Word("frequency_tuned"))]),
+    shown(pipeline("paper", "paper's fusion", &[(MODE, Word("paper"))])),
+    shown(pipeline("scene", "scene (ours)", &[(MODE, Word("scene"))])),
+    prior("centre", "baseline: centre", Prior::Centre),
+    prior("rows", "baseline: rows", Prior::Rows),
     pipeline(
         "c1",
-        "eq. 4 with intensity alone",
+        "c1: intensity",
         &[
             (MODE, Word("paper")),
             (SMOOTHING, Number(0.0)),
@@ -117,7 +114,7 @@ pub const METHODS: &[Method] = &[
     ),
     pipeline(
         "c2",
-        "c1 and colour",
+        "c2: + colour",
         &[
             (MODE, Word("paper")),
             (SMOOTHING, Number(0.0)),
@@ -128,7 +125,7 @@ pub const METHODS: &[Method] = &[
     ),
     pipeline(
         "c3",
-        "c2 and orientation",
+        "c3: + orientation",
         &[
             (MODE, Word("paper")),
             (SMOOTHING, Number(0.0)),
@@ -138,17 +135,24 @@ pub const METHODS: &[Method] = &[
     ),
     pipeline(
         "c4",
-        "c3, depth and motion: all cues, frame by frame",
+        "c4: + depth and motion (the paper's fusion)",
         &[(MODE, Word("paper")), (SMOOTHING, Number(0.0))],
     ),
     pipeline(
         "c5",
-        "c4 with temporal smoothing and an area budget of 40 %",
+        "c5: + temporal smoothing and area budget",
         &[(MODE, Word("paper")), ("roi.max_fraction", Number(0.4))],
     ),
-    prior("centre", "the place alone: a Gaussian at the centre", Prior::Centre),
-    prior("rows", "the place alone: a band at half height", Prior::Rows),
 ];
+
+/// The method that all time is saved against.
+pub const FULL_FRAME: &str = "full_frame";
+
+/// The method that is ours.
+pub const OURS: &str = "scene";
+
+/// The methods of the cue ablation.
+pub const ABLATION: [&str; 5] = ["c1", "c2", "c3", "c4", "c5"];
 
 /// The method of that name.
 pub fn method(name: &str) -> Option<&'static Method> {
