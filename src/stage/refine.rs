@@ -27,6 +27,9 @@ pub const FILLED: f32 = 0.5;
 /// Least rows that are worth a task of their own.
 const ROWS_AT_ONCE: usize = 32;
 
+/// Pixels whose partners are looked up at a time.
+const BLOCK: usize = 64;
+
 /// Left-right check, median, speckle filter, confidence, fill.
 pub struct Refine {
     level: Level,
@@ -84,56 +87,57 @@ impl Refine {
         confidence: &mut Image<f32>,
     ) {
         disparity.resize(self.size);
-        disparity.fill(f32::NAN);
         confidence.resize(self.size);
-        confidence.fill(0.0);
-        let area = Area::of(&roi.matched);
         self.checked.resize(self.size);
         self.evidence.resize(self.size);
         self.smooth.resize(self.size);
-        // Rows are independent of each other in all but the speckle filter and
-        // the sums of the confidence.
-        let width = self.size.width.max(1);
+        let (level, width) = (self.level, self.size.width.max(1));
+        let area = Area::of(&roi.matched);
+        // Rows are independent of each other in all but the joining of patches.
         let (first, most) = (area.rows.start, self.max_difference);
         let within = area.rows.start * width..area.rows.end * width;
         let checked = self.checked.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
         let evidence = self.evidence.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
         checked.zip(evidence).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
             |(i, (checked, evidence))| {
-                check_row(matches, first + i, most, &area, checked, evidence);
+                let y = first + i;
+                dispatch!(level, _ => check_row(matches, y, most, &area, checked, evidence));
             },
         );
         self.outside.resize(self.size.width, NO_MATCH);
-        let (level, checked, outside) = (self.level, &self.checked, &self.outside[..]);
-        let smooth = self.smooth.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
+        let (checked, outside) = (&self.checked, &self.outside[..]);
+        let smooth = self.smooth.pixels_mut()[within].par_chunks_exact_mut(width);
         smooth.enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(i, smooth)| {
             dispatch!(level, simd => median(simd, checked, outside, &area, first + i, smooth));
         });
-        if self.speckle_size > 1 {
-            self.speckles.remove(&mut self.smooth, &area, self.speckle_size, self.speckle_range);
-        }
-        let (evidence, trust) = (&self.evidence, &mut self.trust);
-        dispatch!(self.level, simd => trust.run(simd, evidence, &area, confidence));
+        self.speckles.find(level, &self.smooth, &area, self.speckle_size, self.speckle_range);
+        let (evidence, speckles, trust) = (&self.evidence, &self.speckles, &self.trust);
         let offset = rig.disparity_offset() as f32;
-        let columns = area.columns.clone();
-        let (smooth, least, fills) = (&self.smooth, self.min_confidence, self.fill);
-        let disparity = disparity.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
-        let confidence = confidence.pixels_mut()[within].par_chunks_exact_mut(width);
-        disparity.zip(confidence).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
-            |(i, (disparity, confidence))| {
-                let y = first + i;
-                let smooth = &smooth.row(y)[columns.clone()];
+        let (least, fills) = (self.min_confidence, self.fill);
+        let smooth = self.smooth.pixels_mut().par_chunks_exact_mut(width);
+        let disparity = disparity.pixels_mut().par_chunks_exact_mut(width);
+        let confidence = confidence.pixels_mut().par_chunks_exact_mut(width);
+        smooth.zip(disparity).zip(confidence).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
+            |(y, ((smooth, disparity), confidence))| {
+                let columns = if area.rows.contains(&y) { area.columns.clone() } else { 0..0 };
+                let (before, after) = (..columns.start, columns.end..);
+                disparity[before].fill(f32::NAN);
+                confidence[before].fill(0.0);
+                disparity[after.clone()].fill(f32::NAN);
+                confidence[after].fill(0.0);
+                if columns.is_empty() {
+                    return;
+                }
+                let smooth = &mut smooth[columns.clone()];
+                speckles.erase(y, smooth);
                 let disparity = &mut disparity[columns.clone()];
                 let confidence = &mut confidence[columns.clone()];
-                for ((d, c), &smooth) in disparity.iter_mut().zip(&mut *confidence).zip(smooth) {
-                    if smooth != NO_MATCH && *c >= least {
-                        *d = f32::from(smooth) * DISPARITY_STEP - offset;
-                    } else {
-                        *c = 0.0;
-                    }
-                }
+                dispatch!(level, simd => {
+                    trust.row(simd, evidence, &area, y, confidence);
+                    measure(smooth, offset, least, disparity, confidence);
+                });
                 if fills {
-                    fill(&roi.matched.row(y)[columns.clone()], disparity, confidence);
+                    fill(&roi.matched.row(y)[columns], disparity, confidence);
                 }
             },
         );
@@ -214,6 +218,7 @@ fn median<S: Simd>(
 
 /// Drops disparities that are not unique or that the right view contradicts,
 /// and their evidence.
+#[inline(always)]
 fn check_row(
     matches: &Matches,
     y: usize,
@@ -222,21 +227,45 @@ fn check_row(
     out: &mut [i16],
     kept: &mut [u8],
 ) {
-    let left = matches.left.row(y);
+    let columns = area.columns.clone();
+    let left = &matches.left.row(y)[columns.clone()];
+    let evidence = &matches.evidence.row(y)[columns.clone()];
     let right = matches.right.row(y);
-    let evidence = matches.evidence.row(y);
-    for x in area.columns.clone() {
-        let d = left[x];
-        let agreed = d != NO_MATCH
-            && evidence[x] != 0
-            && max_difference.is_none_or(|most| {
-                let partner = x as i32 - ((i32::from(d) + STEPS / 2) >> STEPS.trailing_zeros());
-                // A partner outside the right image can neither agree nor contradict.
-                usize::try_from(partner).map_or(true, |x| {
-                    let there = right[x.min(right.len() - 1)];
-                    (i32::from(there) - i32::from(d)).abs() <= most
-                })
-            });
-        (out[x], kept[x]) = if agreed { (d, evidence[x]) } else { (NO_MATCH, 0) };
+    let last = right.len() - 1;
+    let most = max_difference.unwrap_or(i32::MAX);
+    let blocks = left.chunks(BLOCK).zip(evidence.chunks(BLOCK));
+    let outs = out[columns.clone()].chunks_mut(BLOCK).zip(kept[columns.clone()].chunks_mut(BLOCK));
+    for (i, ((left, evidence), (out, kept))) in blocks.zip(outs).enumerate() {
+        let x = (columns.start + i * BLOCK) as i32;
+        // Three loops without branches, of which only the one that looks up
+        // the partners goes pixel by pixel.
+        let mut partners = [0_i32; BLOCK];
+        for (k, (partner, &d)) in partners.iter_mut().zip(left).enumerate() {
+            *partner = x + k as i32 - ((i32::from(d) + STEPS / 2) >> STEPS.trailing_zeros());
+        }
+        let mut there = [0_i16; BLOCK];
+        for (there, &partner) in there.iter_mut().zip(&partners[..left.len()]) {
+            *there = right[(partner.max(0) as usize).min(last)];
+        }
+        let pixels = left.iter().zip(evidence).zip(out.iter_mut().zip(kept));
+        for (((&d, &e), (out, kept)), (&there, &partner)) in pixels.zip(there.iter().zip(&partners))
+        {
+            // A partner outside the right image can neither agree nor contradict.
+            let agreed = (partner < 0) | ((i32::from(there) - i32::from(d)).abs() <= most);
+            let keep = agreed & (d != NO_MATCH) & (e != 0);
+            *out = if keep { d } else { NO_MATCH };
+            *kept = if keep { e } else { 0 };
+        }
+    }
+}
+
+/// Disparities in pixels, and none where they are not trusted.
+#[inline(always)]
+fn measure(smooth: &[i16], offset: f32, least: f32, disparity: &mut [f32], confidence: &mut [f32]) {
+    for ((d, c), &smooth) in disparity.iter_mut().zip(confidence).zip(smooth) {
+        let valid = (smooth != NO_MATCH) & (*c >= least);
+        let measured = smooth as f32 * DISPARITY_STEP - offset;
+        *d = if valid { measured } else { f32::NAN };
+        *c = if valid { *c } else { 0.0 };
     }
 }

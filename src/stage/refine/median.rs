@@ -6,30 +6,6 @@ use crate::stage::stereo::NO_MATCH;
 
 const LANES: usize = 16;
 
-/// The exchange network of Paeth, Graphics Gems (1990): leaves the median of
-/// nine values in the fifth place.
-const EXCHANGES: [(usize, usize); 19] = [
-    (1, 2),
-    (4, 5),
-    (7, 8),
-    (0, 1),
-    (3, 4),
-    (6, 7),
-    (1, 2),
-    (4, 5),
-    (7, 8),
-    (0, 3),
-    (5, 8),
-    (4, 7),
-    (3, 6),
-    (1, 4),
-    (2, 5),
-    (4, 7),
-    (4, 2),
-    (6, 4),
-    (4, 2),
-];
-
 /// Median of the 3x3 window of every pixel of `here` that has a disparity;
 /// neighbours without one, or outside the rows, count as the pixel itself.
 ///
@@ -42,15 +18,18 @@ pub fn median_row<S: Simd>(simd: S, above: &[i16], here: &[i16], below: &[i16], 
     if width == 0 {
         return;
     }
-    let mut x = 1;
-    while x + LANES < width {
-        median_lanes(simd, above, here, below, x, out);
-        x += LANES;
+    let inner = 1..width - 1;
+    for x in inner.clone().step_by(LANES) {
+        // The last ones overlap those before.
+        let last = inner.end.saturating_sub(LANES);
+        if last < inner.start {
+            inner.clone().for_each(|x| out[x] = median_at(above, here, below, x));
+            break;
+        }
+        median_lanes(simd, above, here, below, x.min(last), out);
     }
     out[0] = median_at(above, here, below, 0);
-    for (x, out) in out.iter_mut().enumerate().skip(x) {
-        *out = median_at(above, here, below, x);
-    }
+    out[width - 1] = median_at(above, here, below, width - 1);
 }
 
 /// 16 medians from column `x` on; columns `x - 1 .. x + 17` exist.
@@ -65,21 +44,46 @@ fn median_lanes<S: Simd>(
 ) {
     let none = i16x16::splat(simd, NO_MATCH);
     let centre = i16x16::from_slice(simd, &here[x..x + LANES]);
-    let mut p = [centre; 9];
-    for (k, row) in [above, here, below].into_iter().enumerate() {
-        for column in 0..3 {
-            let value = i16x16::from_slice(simd, &row[x + column - 1..x + column - 1 + LANES]);
-            p[3 * k + column] = value.simd_eq(none).select(centre, value);
-        }
-    }
-    for (a, b) in EXCHANGES {
-        let (low, high) = (p[a].min(p[b]), p[a].max(p[b]));
-        p[a] = low;
-        p[b] = high;
-    }
+    let hole = centre.simd_eq(none);
+    // Of nine values in sorted columns, the median is the median of the
+    // largest minimum, the middle median and the smallest maximum (Smith 1996).
+    let rows = [above, here, below];
+    let left = column(simd, rows, x - 1, centre, none);
+    let middle = column(simd, rows, x, centre, none);
+    let right = column(simd, rows, x + 1, centre, none);
+    let least = left[0].max(middle[0]).max(right[0]);
+    let [_, median, _] = sorted(left[1], middle[1], right[1]);
+    let most = left[2].min(middle[2]).min(right[2]);
+    let [_, median, _] = sorted(least, median, most);
     // Holes stay holes.
-    let median = centre.simd_eq(none).select(none, p[4]);
-    median.store_slice(&mut out[x..x + LANES]);
+    hole.select(none, median).store_slice(&mut out[x..x + LANES]);
+}
+
+/// The sorted values of the three rows from column `x` on, `centre` for holes.
+#[inline(always)]
+fn column<S: Simd>(
+    simd: S,
+    [above, here, below]: [&[i16]; 3],
+    x: usize,
+    centre: i16x16<S>,
+    none: i16x16<S>,
+) -> [i16x16<S>; 3] {
+    let above = i16x16::from_slice(simd, &above[x..x + LANES]);
+    let here = i16x16::from_slice(simd, &here[x..x + LANES]);
+    let below = i16x16::from_slice(simd, &below[x..x + LANES]);
+    sorted(
+        above.simd_eq(none).select(centre, above),
+        here.simd_eq(none).select(centre, here),
+        below.simd_eq(none).select(centre, below),
+    )
+}
+
+#[inline(always)]
+fn sorted<S: Simd>(a: i16x16<S>, b: i16x16<S>, c: i16x16<S>) -> [i16x16<S>; 3] {
+    let (a, b) = (a.min(b), a.max(b));
+    let (b, c) = (b.min(c), b.max(c));
+    let (a, b) = (a.min(b), a.max(b));
+    [a, b, c]
 }
 
 /// The median of one pixel, anywhere in the row.
