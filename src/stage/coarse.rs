@@ -13,6 +13,9 @@ use crate::stage::stereo::{Matches, NO_MATCH};
 /// Cells per pixel along each axis: cell `(x, y)` covers the 4x4 pixels from `(4x, 4y)`.
 pub const CELL: usize = 4;
 
+/// Neighbours that a cell needs.
+const SUPPORT: u8 = 2;
+
 /// Disparity of each cell of the frame, in pixels of the FULL-size image, as
 /// `x_l - x_r` (principal points not subtracted).
 #[derive(Clone, Debug, Default)]
@@ -32,6 +35,7 @@ pub struct Coarse {
     left: Image<u8>,
     right: Image<u8>,
     matches: Matches,
+    agreed: Image<f32>,
 }
 
 impl Coarse {
@@ -57,6 +61,7 @@ impl Coarse {
             left: Image::default(),
             right: Image::default(),
             matches: Matches::default(),
+            agreed: Image::default(),
         }
     }
 
@@ -69,7 +74,8 @@ impl Coarse {
         let views =
             Views { left: &self.left, right: &self.right, mask: None, coarse: None, weight: None };
         self.engine.run(&views, &self.plan, &mut self.matches);
-        check(&self.matches, &mut out.checked);
+        check(&self.matches, &mut self.agreed);
+        support(&self.agreed, &mut out.checked);
         fill(&out.checked, &mut out.filled);
     }
 }
@@ -116,6 +122,35 @@ fn check(matches: &Matches, out: &mut Image<f32>) {
                     .and_then(|x| right.get(x))
                     .is_some_and(|&r| (i32::from(d) - i32::from(r)).abs() <= STEPS);
             *out = if agreed { f32::from(d) * pixels_per_step } else { f32::NAN };
+        }
+    }
+}
+
+/// Drops cells that fewer than [`SUPPORT`] of the eight around them bear out to
+/// within one cell: mere chance matches stand alone, while even a thin thing
+/// goes on above and below.
+fn support(agreed: &Image<f32>, out: &mut Image<f32>) {
+    let (width, height) = (agreed.width(), agreed.height());
+    out.copy_from(agreed);
+    if width < 3 || height < 3 {
+        return;
+    }
+    for y in 0..height {
+        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
+        let out = &mut out.row_mut(y)[1..width - 1];
+        let here = &agreed.row(y)[1..width - 1];
+        for (x, (out, &d)) in out.iter_mut().zip(here).enumerate() {
+            let mut count = 0;
+            for (i, &v) in rows.iter().enumerate() {
+                for u in 0..3 {
+                    let other = agreed.row(v)[x + u];
+                    let counts = (i != 1 || u != 1) && (i == 1 || v != y);
+                    count += u8::from(counts && (other - d).abs() <= CELL as f32);
+                }
+            }
+            if count < SUPPORT {
+                *out = f32::NAN;
+            }
         }
     }
 }

@@ -22,6 +22,10 @@ const REACH: usize = 12;
 /// Pixels by which the range exceeds the coarse disparities.
 const SLACK: f32 = 4.0;
 
+/// The same where the tile itself has too few of them.
+const FAR_REACH: usize = 48;
+const FAR_SLACK: f32 = 8.0;
+
 /// A tile of 32 columns and the rows of its band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tile {
@@ -182,33 +186,47 @@ fn next_clear(columns: &[u8], from: usize) -> usize {
 }
 
 /// The disparities of one tile: those of the coarse cells in and around it,
-/// with some slack, and everything when fewer than a third of the cells in it
-/// have a disparity.
+/// with some slack. Where fewer than a third of the cells in it have a
+/// disparity, its surroundings are asked as well, and everything is searched
+/// where they know no more.
 fn narrowed(coarse: &Image<f32>, x0: usize, rows: &Range<usize>, search: &Range<usize>) -> Tile {
-    let all = Tile { lo: search.start, n: search.len() };
-    let cells = |from: usize, to: usize, limit: usize| {
-        (from / CELL).min(limit)..to.div_ceil(CELL).min(limit)
+    // No left pixel has a partner further away than the right image's border.
+    let end = search.end.min(x0 + LANES + 1).max(search.start + 1);
+    let all = Tile { lo: search.start, n: end - search.start };
+    let window = |reach: usize| {
+        let cells = |from: usize, to: usize, limit: usize| {
+            (from.saturating_sub(reach) / CELL).min(limit)..(to + reach).div_ceil(CELL).min(limit)
+        };
+        (cells(x0, x0 + LANES, coarse.width()), cells(rows.start, rows.end, coarse.height()))
     };
-    let inner_x = cells(x0, x0 + LANES, coarse.width());
-    let outer_x = cells(x0.saturating_sub(REACH), x0 + LANES + REACH, coarse.width());
-    let inner_y = cells(rows.start, rows.end, coarse.height());
-    let outer_y = cells(rows.start.saturating_sub(REACH), rows.end + REACH, coarse.height());
+    let known = |reach: usize| {
+        let (columns, rows) = window(reach);
+        let area = columns.len() * rows.len();
+        let known: usize = rows
+            .map(|y| coarse.row(y)[columns.clone()].iter().filter(|d| !d.is_nan()).count())
+            .sum();
+        3 * known >= area
+    };
+    let (reach, slack) = if known(0) {
+        (REACH, SLACK)
+    } else if known(FAR_REACH) {
+        (FAR_REACH, FAR_SLACK)
+    } else {
+        return all;
+    };
+    let (columns, rows) = window(reach);
     let (mut min, mut max) = (f32::INFINITY, f32::NEG_INFINITY);
-    for y in outer_y {
-        for &d in &coarse.row(y)[outer_x.clone()] {
+    for y in rows {
+        for &d in &coarse.row(y)[columns.clone()] {
             // NaN changes neither.
             min = min.min(d);
             max = max.max(d);
         }
     }
-    let known: usize = inner_y
-        .clone()
-        .map(|y| coarse.row(y)[inner_x.clone()].iter().filter(|d| !d.is_nan()).count())
-        .sum();
-    if 3 * known < inner_x.len() * inner_y.len() || min > max {
+    if min > max {
         return all;
     }
-    let lo = ((min - SLACK).floor().max(0.0) as usize).clamp(search.start, search.end - 1);
-    let hi = ((max + SLACK).ceil().max(0.0) as usize + 1).clamp(lo + 1, search.end);
+    let lo = ((min - slack).floor().max(0.0) as usize).clamp(search.start, end - 1);
+    let hi = ((max + slack).ceil().max(0.0) as usize + 1).clamp(lo + 1, end);
     Tile { lo, n: hi - lo }
 }
