@@ -244,7 +244,7 @@ fn images(
             Images::Raw(listed(node, topic, topics)?)
         }
         ImageTransport::Compressed => {
-            let topic = node.names().compressed_topic(name)?;
+            let topic = node.names().transport_topic(name, "compressed")?;
             Images::Compressed(listed(node, topic, topics)?)
         }
     })

@@ -8,7 +8,7 @@
 //! | `Image`, `CompressedImage` of numbers | `Image<f32>`, `Image<u16>` | [`floats`], [`labels`], [`compressed_u16`] |
 //! | two `CameraInfo` | [`StereoRig`] | [`rig`] |
 //! | [`Camera`] | `CameraInfo` | [`camera_info`] |
-//! | [`Perception`] | messages | [`region_array`], [`disparity_image`], [`depth_image`], … |
+//! | [`Perception`] | messages | [`region_array`], [`detections_2d`], [`markers`], [`disparity_image`], [`depth_image`], [`points`], [`compressed_depth`], … |
 //!
 //! [`StereoRig`]: crate::camera::StereoRig
 //! [`Camera`]: crate::camera::Camera
@@ -17,10 +17,14 @@ mod bayer;
 mod calibration;
 mod compressed;
 mod dense;
+mod detection;
 mod encoding;
 mod fit;
+mod marker;
 mod picture;
+mod points;
 mod region;
+mod transport;
 mod yuv;
 
 use thiserror::Error;
@@ -31,10 +35,14 @@ pub use dense::{
     confidence_image, depth_camera_info, depth_image, disparity_image, float_image, floats,
     label_image, labels, picture_image, rgb_image, saliency_image,
 };
+pub use detection::{CLASS_ID, detections_2d, detections_3d};
 pub use encoding::ENCODINGS;
 pub use fit::{REGIONS_LIMIT, Reduction, fit_regions};
+pub use marker::markers;
 pub use picture::{picture, picture_into};
+pub use points::points;
 pub use region::region_array;
+pub use transport::{compressed_depth, compressed_rgb, compressed_saliency};
 
 use crate::image::{Image, Picture, Size};
 use crate::perception::Perception;

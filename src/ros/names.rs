@@ -121,13 +121,14 @@ impl Names {
         self.resolve(name, RemapKind::Service)
     }
 
-    /// The full name of `<topic>/compressed`: the image topic is remapped
-    /// first, as `image_transport` does, then its compressed form.
+    /// The full name of `<topic>/compressed`, `<topic>/compressedDepth` and the
+    /// like: the image topic is remapped first, as `image_transport` does, then
+    /// its compressed form.
     ///
     /// # Errors
     /// When the name breaks the naming rules.
-    pub fn compressed_topic(&self, image_topic: &str) -> Result<String, NameError> {
-        self.topic(&format!("{}/compressed", self.topic(image_topic)?))
+    pub fn transport_topic(&self, image_topic: &str, transport: &str) -> Result<String, NameError> {
+        self.topic(&format!("{}/{transport}", self.topic(image_topic)?))
     }
 
     fn resolve(&self, name: &str, kind: RemapKind) -> Result<String, NameError> {
@@ -273,7 +274,10 @@ mod tests {
     fn an_image_topic_is_remapped_before_its_compressed_form() {
         let names =
             Names::new("/", "n", &[rule(RemapKind::Any, "left/image_rect", "/cam/l")]).unwrap();
-        assert_eq!(names.compressed_topic("left/image_rect").unwrap(), "/cam/l/compressed");
+        assert_eq!(
+            names.transport_topic("left/image_rect", "compressed").unwrap(),
+            "/cam/l/compressed"
+        );
     }
 
     #[test]

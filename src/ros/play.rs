@@ -85,8 +85,8 @@ impl StereoPlayer {
         let mut topics = Vec::new();
         let (left, right) = ("left/image_rect", "right/image_rect");
         let images = if compressed {
-            let names =
-                [node.names().compressed_topic(left)?, node.names().compressed_topic(right)?];
+            let name = |topic| node.names().transport_topic(topic, "compressed");
+            let names = [name(left)?, name(right)?];
             Publishers::Compressed(two(node, names, &mut topics)?)
         } else {
             let names = [node.names().topic(left)?, node.names().topic(right)?];

@@ -193,7 +193,31 @@ def check_regions(at, array, labels):
             check(area == region.area, f"{where}: area {region.area}, {area} labelled pixels")
 
 
+def check_detections(at, array, flat, solid):
+    placed = [r for r in array.regions if np.isfinite([r.position.x, r.position.y, r.position.z]).all()]
+    check(len(flat.detections) == len(array.regions), f"{at}: {len(flat.detections)} in the image")
+    check(len(solid.detections) == len(placed), f"{at}: {len(solid.detections)} in space")
+    for region, detection in zip(array.regions, flat.detections):
+        box, roi = detection.bbox, region.roi
+        left, top = box.center.position.x - box.size_x / 2, box.center.position.y - box.size_y / 2
+        check((left, top) == (roi.x_offset, roi.y_offset), f"{at}: box at {left}, {top}")
+        check(detection.id in ("", str(region.track_id)), f"{at}: id {detection.id}")
+    for region, detection in zip(placed, solid.detections):
+        check(detection.bbox.center.position.z == region.position.z, f"{at}: detection in space")
+    return len(placed)
+
+
+def check_markers(messages, places):
+    for time, message in messages:
+        check(len(message.markers) == 2 * places[time], f"{time}: {len(message.markers)} markers")
+        for marker in message.markers:
+            check(stamp(marker.header) == time, f"{time}: stamp of a marker")
+            check(marker.lifetime.nanosec > 0, f"{time}: a marker that stays for ever")
+
+
 def check_results(topics):
+    marker_messages = topics.get("/markers", [])
+    topics = {topic: messages for topic, messages in topics.items() if topic != "/markers"}
     by_topic = {
         topic: {stamp(m.header): m for _, m in messages}
         for topic, messages in topics.items()
@@ -207,6 +231,7 @@ def check_results(topics):
         for time, message in messages:
             check(time == stamp(message.header), f"{topic}: log time {time} is not the stamp")
     counts = Counter()
+    places = {}
     for at, array in regions.items():
         here = {topic: messages.get(at) for topic, messages in by_topic.items()}
         for topic, message in here.items():
@@ -233,7 +258,11 @@ def check_results(topics):
         for topic in ["/confidence/image_rect", "/saliency/image_rect"]:
             if here.get(topic) is not None:
                 check_unit(at, topic, here[topic])
+        if here.get("/detections_2d") is not None and here.get("/detections_3d") is not None:
+            places[at] = check_detections(at, array, here["/detections_2d"], here["/detections_3d"])
         counts["regions"] += len(array.regions)
+    check(len(marker_messages) == len(places), f"/markers: {len(marker_messages)}")
+    check_markers(marker_messages, places)
     return len(regions), counts
 
 

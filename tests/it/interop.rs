@@ -36,8 +36,8 @@ fn python() -> Command {
 #[test]
 fn a_cyclone_peer_gets_one_region_array_per_pair() {
     let Some(script) = script("cyclone_stereo.py") else { return };
-    for (test, reliability) in [(3, "reliable"), (3, "best_effort")] {
-        let domain = 1 + (std::process::id() % 24) as u16 * 4 + test;
+    for (test, reliability) in [(4, "reliable"), (4, "best_effort")] {
+        let domain = 1 + (std::process::id() % 12) as u16 * 8 + test;
         let names = Names::new("/robot", NODE_NAME, &[]).unwrap();
         let config = Config::default().with("saliency.mode", &json!("paper")).unwrap();
         let mut runtime =

@@ -2,6 +2,7 @@
 //! own, one the node, one its peer. Bounded in count and time.
 
 mod faults;
+mod lazy;
 
 use std::sync::atomic::AtomicBool;
 use std::thread;
@@ -34,7 +35,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A domain that no other test of this process uses, and hardly one of another.
 fn environment(test: u16) -> Environment {
-    Environment::localhost(1 + (std::process::id() % 24) as u16 * 4 + test)
+    Environment::localhost(1 + (std::process::id() % 12) as u16 * 8 + test)
 }
 
 fn names(node: &str) -> Names {

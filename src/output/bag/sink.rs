@@ -12,9 +12,9 @@ use crate::ros::convert;
 use crate::ros::message::salient_stereo_msgs::SalientRegionArray;
 use crate::ros::message::sensor_msgs::{self, CameraInfo, CompressedImage};
 use crate::ros::message::stereo_msgs::DisparityImage;
+use crate::ros::message::vision_msgs::{Detection2DArray, Detection3DArray};
+use crate::ros::message::visualization_msgs::MarkerArray;
 use crate::stamp::Stamp;
-
-const OVERLAY_QUALITY: u8 = 90;
 
 /// Which topics a bag of results has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +22,8 @@ const OVERLAY_QUALITY: u8 = 90;
 pub struct BagTopicsOut {
     /// `/regions`
     pub regions: bool,
+    /// `/detections_2d`, `/detections_3d` and `/markers`
+    pub detections: bool,
     /// `/disparity`
     pub disparity: bool,
     /// `/depth/image_rect` and `/depth/camera_info`
@@ -43,6 +45,7 @@ impl Default for BagTopicsOut {
     fn default() -> Self {
         Self {
             regions: true,
+            detections: true,
             disparity: true,
             depth: true,
             confidence: true,
@@ -67,6 +70,7 @@ pub struct BagSink {
 
 struct Topics {
     regions: Option<Topic<SalientRegionArray>>,
+    detections: Option<Detections>,
     disparity: Option<Topic<DisparityImage>>,
     depth: Option<(Topic<sensor_msgs::Image>, Topic<CameraInfo>)>,
     confidence: Option<Topic<sensor_msgs::Image>>,
@@ -74,6 +78,31 @@ struct Topics {
     labels: Option<Topic<sensor_msgs::Image>>,
     overlay: Option<Topic<CompressedImage>>,
     left: Option<Topic<sensor_msgs::Image>>,
+}
+
+/// The regions again, in the words of other tools.
+#[derive(Clone, Copy)]
+struct Detections {
+    flat: Topic<Detection2DArray>,
+    solid: Topic<Detection3DArray>,
+    markers: Topic<MarkerArray>,
+}
+
+impl Detections {
+    fn add(bag: &mut BagWriter) -> Result<Self, BagWriteError> {
+        Ok(Self {
+            flat: bag.topic("/detections_2d")?,
+            solid: bag.topic("/detections_3d")?,
+            markers: bag.topic("/markers")?,
+        })
+    }
+
+    fn write(self, bag: &mut BagWriter, perception: &Perception) -> Result<(), BagWriteError> {
+        let stamp = perception.stamp;
+        bag.write(self.flat, stamp, &convert::detections_2d(perception))?;
+        bag.write(self.solid, stamp, &convert::detections_3d(perception))?;
+        bag.write(self.markers, stamp, &convert::markers(perception))
+    }
 }
 
 impl BagSink {
@@ -111,6 +140,7 @@ impl Topics {
         };
         Ok(Self {
             regions: wanted.regions.then(|| bag.topic("/regions")).transpose()?,
+            detections: wanted.detections.then(|| Detections::add(bag)).transpose()?,
             disparity: wanted.disparity.then(|| bag.topic("/disparity")).transpose()?,
             depth: match image(bag, wanted.depth, "/depth/image_rect")? {
                 Some(depth) => Some((depth, bag.topic("/depth/camera_info")?)),
@@ -147,7 +177,15 @@ impl Sink for BagSink {
         let stamp = perception.stamp;
         let header = || convert::header(perception);
         put(bag, topics.left, stamp, || convert::rgb_image(&perception.left.rgb, header()))?;
-        put(bag, topics.regions, stamp, || convert::region_array(perception, self.masks))?;
+        put(bag, topics.regions, stamp, || {
+            let mut array = convert::region_array(perception, self.masks);
+            // As on the wire, where larger ones would not arrive.
+            convert::fit_regions(&mut array);
+            array
+        })?;
+        if let Some(detections) = topics.detections {
+            detections.write(bag, perception)?;
+        }
         put(bag, topics.disparity, stamp, || convert::disparity_image(perception))?;
         let (depth, info) = topics.depth.unzip();
         put(bag, depth, stamp, || convert::depth_image(perception, self.depth_encoding))?;
@@ -157,15 +195,7 @@ impl Sink for BagSink {
         put(bag, topics.labels, stamp, || convert::label_image(&perception.labels, header()))?;
         if topics.overlay.is_some() {
             picture::regions(perception, overlay);
-            // Fails for an empty picture only, which has no overlay to show.
-            if let Ok(data) = picture::jpeg(overlay, OVERLAY_QUALITY) {
-                let format = "rgb8; jpeg compressed bgr8".to_owned();
-                put(bag, topics.overlay, stamp, || CompressedImage {
-                    header: header(),
-                    format,
-                    data,
-                })?;
-            }
+            put(bag, topics.overlay, stamp, || convert::compressed_rgb(overlay, header()))?;
         }
         bag.flush()
     }

@@ -72,7 +72,7 @@ pub fn depth_image(perception: &Perception, encoding: DepthEncoding) -> sensor_m
     }
 }
 
-fn millimetres(metres: f32) -> u16 {
+pub(super) fn millimetres(metres: f32) -> u16 {
     let rounded = (metres * 1000.0).round();
     // NaN and both infinities fail the comparison.
     if (0.0..=f32::from(u16::MAX)).contains(&rounded) { rounded as u16 } else { 0 }
