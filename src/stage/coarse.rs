@@ -14,7 +14,10 @@ use crate::stage::stereo::{Matches, NO_MATCH};
 pub const CELL: usize = 4;
 
 /// Neighbours that a cell needs.
-const SUPPORT: u8 = 2;
+const SUPPORT: u32 = 2;
+
+/// Cells that are looked at together.
+const BLOCK: usize = 64;
 
 /// Disparity of each cell of the frame, in pixels of the FULL-size image, as
 /// `x_l - x_r` (principal points not subtracted).
@@ -67,8 +70,7 @@ impl Coarse {
 
     /// Matches two views of the size given to `new`.
     pub fn run(&mut self, left: &View, right: &View, out: &mut CoarseDisparity) {
-        shrink(&left.gray, &mut self.left);
-        shrink(&right.gray, &mut self.right);
+        rayon::join(|| shrink(&left.gray, &mut self.left), || shrink(&right.gray, &mut self.right));
         let search = self.engine.settings().search.clone();
         self.plan.whole(self.size, &search);
         let views =
@@ -136,21 +138,36 @@ fn support(agreed: &Image<f32>, out: &mut Image<f32>) {
         return;
     }
     for y in 0..height {
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)];
-        let out = &mut out.row_mut(y)[1..width - 1];
-        let here = &agreed.row(y)[1..width - 1];
-        for (x, (out, &d)) in out.iter_mut().zip(here).enumerate() {
-            let mut count = 0;
-            for (i, &v) in rows.iter().enumerate() {
-                for u in 0..3 {
-                    let other = agreed.row(v)[x + u];
-                    let counts = (i != 1 || u != 1) && (i == 1 || v != y);
-                    count += u8::from(counts && (other - d).abs() <= CELL as f32);
+        let nowhere = &agreed.row(y)[..0];
+        let above = if y > 0 { agreed.row(y - 1) } else { nowhere };
+        let below = if y + 1 < height { agreed.row(y + 1) } else { nowhere };
+        support_row(above, agreed.row(y), below, out.row_mut(y));
+    }
+}
+
+/// One row of it; nothing is above or below where that row is empty. The first
+/// and the last cell stay as they are.
+fn support_row(above: &[f32], here: &[f32], below: &[f32], out: &mut [f32]) {
+    let inner = here.len() - 2;
+    let near = |a: f32, b: f32| u32::from((a - b).abs() <= CELL as f32);
+    let centres = &here[1..=inner];
+    let mut counts = [0_u32; BLOCK];
+    for x in (0..inner).step_by(BLOCK) {
+        let n = BLOCK.min(inner - x);
+        let centres = &centres[x..x + n];
+        let counts = &mut counts[..n];
+        counts.fill(0);
+        for (row, offsets) in [(above, &[0, 1, 2][..]), (here, &[0, 2]), (below, &[0, 1, 2])] {
+            for offset in offsets {
+                let others = row.get(x + offset..x + offset + n).unwrap_or_default();
+                for ((count, &d), &other) in counts.iter_mut().zip(centres).zip(others) {
+                    // False where either is NaN.
+                    *count += near(d, other);
                 }
             }
-            if count < SUPPORT {
-                *out = f32::NAN;
-            }
+        }
+        for ((out, &d), &count) in out[1 + x..].iter_mut().zip(centres).zip(&*counts) {
+            *out = if count < SUPPORT { f32::NAN } else { d };
         }
     }
 }
@@ -206,4 +223,42 @@ pub(crate) fn fill_row(row: &mut [f32]) -> bool {
         x = end;
     }
     left.is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_needs_two_neighbours_that_agree() {
+        // As the words say it, without blocks or rows apart.
+        let plain = |image: &Image<f32>, x: usize, y: usize| {
+            let d = image.get(x, y);
+            if image.height() < 3 || image.width() < 3 || x == 0 || x + 1 == image.width() {
+                return d;
+            }
+            let near =
+                |v: usize, u: usize| (u, v) != (x, y) && (image.get(u, v) - d).abs() <= CELL as f32;
+            let rows = y.saturating_sub(1)..(y + 2).min(image.height());
+            let count = rows.flat_map(|v| (x - 1..x + 2).map(move |u| (v, u)));
+            let count = count.filter(|&(v, u)| near(v, u)).count();
+            if count < 2 { f32::NAN } else { d }
+        };
+        for size in [Size::new(1, 1), Size::new(3, 3), Size::new(70, 5), Size::new(131, 9)] {
+            let mut state = 7_u64;
+            let image = Image::from_fn(size, |_, _| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                let value = (state >> 40) % 24;
+                if value < 4 { f32::NAN } else { value as f32 }
+            });
+            let mut found = Image::default();
+            support(&image, &mut found);
+            for y in 0..size.height {
+                for x in 0..size.width {
+                    let (found, expected) = (found.get(x, y), plain(&image, x, y));
+                    assert_eq!(found.to_bits(), expected.to_bits(), "({x}, {y}) of {size}");
+                }
+            }
+        }
+    }
 }

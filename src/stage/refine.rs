@@ -252,7 +252,7 @@ fn check_row(
         {
             // A partner outside the right image can neither agree nor contradict.
             let agreed = (partner < 0) | ((i32::from(there) - i32::from(d)).abs() <= most);
-            let keep = agreed & (d != NO_MATCH) & (e != 0);
+            let keep = agreed && d != NO_MATCH && e != 0;
             *out = if keep { d } else { NO_MATCH };
             *kept = if keep { e } else { 0 };
         }
@@ -263,7 +263,7 @@ fn check_row(
 #[inline(always)]
 fn measure(smooth: &[i16], offset: f32, least: f32, disparity: &mut [f32], confidence: &mut [f32]) {
     for ((d, c), &smooth) in disparity.iter_mut().zip(confidence).zip(smooth) {
-        let valid = (smooth != NO_MATCH) & (*c >= least);
+        let valid = smooth != NO_MATCH && *c >= least;
         let measured = smooth as f32 * DISPARITY_STEP - offset;
         *d = if valid { measured } else { f32::NAN };
         *c = if valid { *c } else { 0.0 };

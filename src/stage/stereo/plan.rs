@@ -20,7 +20,7 @@ const FULL_FRAME_FROM: f32 = 0.6;
 const REACH: usize = 12;
 
 /// Pixels by which the range exceeds the coarse disparities.
-const SLACK: f32 = 4.0;
+const SLACK: f32 = 3.0;
 
 /// The same where the tile itself has too few of them.
 const FAR_REACH: usize = 48;

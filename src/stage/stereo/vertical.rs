@@ -156,10 +156,7 @@ impl Vertical {
         let used: &[usize] =
             if DIAGONALS { &[STRAIGHT, FROM_LEFT, FROM_RIGHT] } else { &[STRAIGHT] };
         for (k, tile) in shape.tiles.iter().enumerate() {
-            let mut coarse = [f32::NAN; LANES];
-            for (i, coarse) in coarse.iter_mut().enumerate() {
-                *coarse = seeds.at(k * LANES + i, y);
-            }
+            let coarse = std::array::from_fn(|i| seeds.at(k * LANES + i, y));
             for d in tile.lo..tile.lo + tile.n {
                 let lanes = Seeds::costs(&coarse, d, penalties.p2);
                 for layer in used {

@@ -146,24 +146,28 @@ pub struct Seeds<'a> {
     pub right: usize,
 }
 
-/// Cost per pixel of distance from the coarse disparity.
-const SEED_SLOPE: f32 = 2.0;
+/// Half pixels of 32 columns or rows; [`UNKNOWN`] where nothing is known.
+type HalfPixels = [i16; LANES];
+
+/// Further from any disparity than P2 can say.
+const UNKNOWN: i16 = -10_000;
 
 impl Seeds<'_> {
     /// Coarse disparity at a run column and an image row.
     #[inline(always)]
-    pub fn at(&self, x: usize, image_y: usize) -> f32 {
-        self.coarse.get_clamped(((self.x0 + x) / CELL) as isize, (image_y / CELL) as isize)
+    pub fn at(&self, x: usize, image_y: usize) -> i16 {
+        let coarse =
+            self.coarse.get_clamped(((self.x0 + x) / CELL) as isize, (image_y / CELL) as isize);
+        if coarse.is_nan() { UNKNOWN } else { (2.0 * coarse + 0.5) as i16 }
     }
 
-    /// Start of 32 paths: up to P2, growing with the distance from the coarse
-    /// disparity; 255 where that is unknown, which stands for "anything".
+    /// Start of 32 paths: a cost of two per pixel of distance from the coarse
+    /// disparity, up to P2, which is also what stands for "anything".
     #[inline(always)]
-    pub fn costs(coarse: &[f32; LANES], d: usize, p2: u8) -> Block {
-        let mut out = [255; LANES];
+    pub fn costs(coarse: &HalfPixels, d: usize, p2: u8) -> Block {
+        let mut out = [0; LANES];
         for (out, &coarse) in out.iter_mut().zip(coarse) {
-            let cost = ((coarse - d as f32).abs() * SEED_SLOPE).min(p2 as f32) as u8;
-            *out = if coarse.is_nan() { 255 } else { cost };
+            *out = (coarse - 2 * d as i16).abs().min(p2 as i16) as u8;
         }
         out
     }
@@ -178,7 +182,7 @@ impl Seeds<'_> {
         p2: u8,
         state: &mut [Block],
     ) {
-        let mut coarse = [f32::NAN; LANES];
+        let mut coarse = [UNKNOWN; LANES];
         for (i, coarse) in coarse.iter_mut().enumerate() {
             *coarse = self.at(x, self.y0 + i.min(shape.rows - 1));
         }

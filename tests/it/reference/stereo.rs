@@ -114,9 +114,10 @@ impl<'a> Domain<'a> {
             let c = coarse.get_clamped(p.0 / CELL as isize, p.1 / CELL as isize);
             if !c.is_nan() {
                 for d in self.range(p.0) {
-                    let slope =
-                        (2.0 * (c - d as f32).abs()).min(f32::from(self.settings.penalties.p2));
-                    state.costs.insert(d, slope as u8);
+                    // The coarse disparity to the nearest half pixel.
+                    let slope = (2.0 * c + 0.5).floor() - 2.0 * d as f32;
+                    let most = f32::from(self.settings.penalties.p2);
+                    state.costs.insert(d, slope.abs().min(most) as u8);
                 }
             }
         }
