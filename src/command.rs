@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod demo;
+pub mod doctor;
 pub mod evaluate;
 pub mod export_bag;
 pub mod node;
@@ -39,6 +40,8 @@ enum Command {
     Node(node::NodeArgs),
     /// Run a bag through the pipeline, without a network, to an output bag and a report.
     Replay(replay::ReplayArgs),
+    /// Say what is wrong with a bag, or with the live graph, and how to mend it.
+    Doctor(doctor::DoctorArgs),
     /// Write a scene of a data set, or a pair of images, as a ROS 2 bag.
     ExportBag(export_bag::ExportBagArgs),
     /// Measure milliseconds per stage.
@@ -86,6 +89,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Node(args) => return node::run_to_exit(&args),
         Command::Replay(args) => replay::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::ExportBag(args) => export_bag::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),

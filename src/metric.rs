@@ -23,6 +23,7 @@
 //! | J, F, recall, decay | IoU; F of outlines within 0.8 % of the diagonal; share above ½; first less last quarter | DAVIS 2016 |
 //! | warped IoU | IoU of a mask with the one before, moved along the flow | |
 //! | region precision, recall, F1 | one-to-one matching at IoU ≥ τ | PASCAL VOC |
+//! | epipolar error | median vertical distance of a corner from its partner, px | |
 //! | ID switches | a true object continues under another track | CLEAR MOT 2008 |
 //!
 //! Every accumulator takes frames one by one and answers `None` when nothing
@@ -34,6 +35,7 @@
 mod continuity;
 mod disparity;
 mod distance;
+mod epipolar;
 mod fill;
 mod identity;
 mod map;
@@ -48,6 +50,7 @@ mod video;
 
 pub use continuity::continuity;
 pub use disparity::{DisparityScore, DisparityStats};
+pub use epipolar::{Epipolar, epipolar};
 pub use fill::fill;
 pub use identity::IdSwitches;
 pub use map::{MapScore, MapStats};

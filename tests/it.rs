@@ -8,6 +8,8 @@ mod it {
     mod dataset;
     mod depth;
     #[cfg(feature = "tool")]
+    mod doctor;
+    #[cfg(feature = "tool")]
     mod evaluate;
     #[cfg(feature = "tool")]
     mod evaluation;

@@ -216,6 +216,19 @@ impl NodeStatus {
         *lock(&self.input) = Some(state);
     }
 
+    /// Left and right images received so far; `None` before the first.
+    pub fn received(&self) -> Option<[u64; 2]> {
+        let input = lock(&self.input);
+        input.as_ref().map(|state| [state.counts.left.received, state.counts.right.received])
+    }
+
+    /// Why images were not paired; `None` when all were.
+    pub fn explain_pairing(&self) -> Option<String> {
+        let input = lock(&self.input);
+        let state = input.as_ref()?;
+        state.counts.explain(&state.explanation_settings, state.has_info)
+    }
+
     /// The calibration in use, or why there is none. True when this is news.
     pub fn set_calibration(&self, calibration: Result<String, String>) -> bool {
         let mut current = lock(&self.calibration);

@@ -8,6 +8,7 @@ use ros2_client::{
     Context, CreateError, Name, Node, NodeCreateError, NodeLoggingHandle, NodeName, NodeOptions,
     Publisher, QosProfile, ServiceMapping, ServiceTypeName, Subscription,
 };
+use rustdds::policy::{Durability, Reliability};
 use rustdds::{DomainParticipant, DomainParticipantBuilder, QosPolicies, Topic, TopicKind};
 use thiserror::Error;
 
@@ -293,6 +294,86 @@ impl Graph {
         }
         (matching, others)
     }
+
+    /// The full names of all topics that others publish with this type, sorted.
+    pub fn published_topics(&self, type_name: &str) -> Vec<String> {
+        let kind = dds_type(type_name);
+        let writers = self.participant.discovered_writers();
+        let data = writers.iter().map(|writer| &writer.publication_topic_data);
+        let mut topics: Vec<String> = data
+            .filter(|data| data.type_name == kind)
+            .filter_map(|data| Some(data.topic_name.strip_prefix("rt")?.to_owned()))
+            .collect();
+        topics.sort_unstable();
+        topics.dedup();
+        topics
+    }
+
+    /// Publishers and subscriptions of others that name one topic and type and
+    /// still do not fit, because a subscription requests what is not offered.
+    pub fn qos_conflicts(&self) -> Vec<QosConflict> {
+        let (writers, readers) =
+            (self.participant.discovered_writers(), self.participant.discovered_readers());
+        let mut conflicts = Vec::new();
+        for writer in &writers {
+            let offer = &writer.publication_topic_data;
+            let Some(topic) = offer.topic_name.strip_prefix("rt/") else { continue };
+            let offered = offer.qos();
+            for reader in &readers {
+                let request = &reader.subscription_topic_data;
+                if *request.topic_name() != offer.topic_name
+                    || *request.type_name() != offer.type_name
+                {
+                    continue;
+                }
+                let requested = request.qos();
+                if offered.compliance_failure_wrt(&requested).is_some() {
+                    conflicts.push(QosConflict {
+                        topic: format!("/{topic}"),
+                        offered: qos_text(&offered),
+                        requested: qos_text(&requested),
+                    });
+                }
+            }
+        }
+        conflicts.sort_unstable();
+        conflicts.dedup();
+        conflicts
+    }
+}
+
+/// A publisher and a subscription of one topic that cannot be matched.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct QosConflict {
+    /// Full name of the topic.
+    pub topic: String,
+    /// What the publisher offers.
+    pub offered: String,
+    /// What the subscription requests.
+    pub requested: String,
+}
+
+impl std::fmt::Display for QosConflict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { topic, offered, requested } = self;
+        write!(
+            f,
+            "{topic}: a publisher offers {offered}, a subscription requests {requested}: nothing arrives"
+        )
+    }
+}
+
+/// The two policies that ROS 2 users set, in ROS 2 terms.
+fn qos_text(qos: &QosPolicies) -> String {
+    let reliability = match qos.reliability() {
+        Some(Reliability::Reliable { .. }) => "reliable",
+        _ => "best effort",
+    };
+    let durability = match qos.durability() {
+        None | Some(Durability::Volatile) => "volatile",
+        Some(_) => "transient local",
+    };
+    format!("{reliability}, {durability}")
 }
 
 /// What the kernel makes of the wanted receive buffer, measured on a socket of

@@ -148,9 +148,7 @@ impl Reporter {
                 input.say(DiagnosticStatus::ERROR, format_args!("nobody publishes {topic}"));
             }
         }
-        if let Some(state) = &state
-            && let Some(text) = state.counts.explain(&state.explanation_settings, state.has_info)
-        {
+        if let Some(text) = status.explain_pairing() {
             input.say(DiagnosticStatus::WARN, text);
         }
         if totals.dropped.values().sum::<u64>() > before.dropped.values().sum() {
