@@ -230,6 +230,7 @@ group!(
     /// `stereo.*`
     Stereo {
         algorithm: Algorithm = Algorithm::SemiGlobal,
+        paths: i64 = 8,
         min_disparity: i64 = 0,
         disparity_range: i64 = 192,
         p1: i64 = 8,

@@ -160,6 +160,11 @@ pub const FIELDS: &[Field] = &[
         "Largest share of the image that is matched; the most salient tiles are kept.",
     ),
     live("stereo.algorithm", Choice(&["semi_global", "block", "census_block"]), "The matcher."),
+    live(
+        "stereo.paths",
+        OneOf(&[4, 5, 8]),
+        "Paths of the semi-global matcher: 8 is the most accurate; 5 leaves out those from below and takes about a quarter less time, 4 the diagonals.",
+    ),
     live("stereo.min_disparity", Integer(0, 511), "Smallest disparity searched, in pixels."),
     live("stereo.disparity_range", Integer(16, 512), "Number of disparities searched, in pixels."),
     live(

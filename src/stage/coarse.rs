@@ -3,7 +3,8 @@
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{DISPARITY_STEP, View};
-use crate::simd::Level;
+use crate::simd::prelude::*;
+use crate::simd::{LANES, Level, Simd, dispatch, load};
 use crate::stage::stereo::cost::Penalties;
 use crate::stage::stereo::engine::{Engine, Method, Settings, Views};
 use crate::stage::stereo::plan::Plan;
@@ -32,6 +33,7 @@ pub struct CoarseDisparity {
 
 /// The quarter-size matcher.
 pub struct Coarse {
+    level: Level,
     size: Size,
     engine: Engine,
     plan: Plan,
@@ -58,6 +60,7 @@ impl Coarse {
             search: lo / CELL..hi.div_ceil(CELL) + 1,
         };
         Self {
+            level,
             size: size.divided_by(CELL),
             engine: Engine::new(settings, level),
             plan: Plan::default(),
@@ -70,7 +73,11 @@ impl Coarse {
 
     /// Matches two views of the size given to `new`.
     pub fn run(&mut self, left: &View, right: &View, out: &mut CoarseDisparity) {
-        rayon::join(|| shrink(&left.gray, &mut self.left), || shrink(&right.gray, &mut self.right));
+        let level = self.level;
+        rayon::join(
+            || shrink(level, &left.gray, &mut self.left),
+            || shrink(level, &right.gray, &mut self.right),
+        );
         let search = self.engine.settings().search.clone();
         self.plan.whole(self.size, &search);
         let views =
@@ -83,29 +90,41 @@ impl Coarse {
 }
 
 /// Mean of each cell; cells that reach beyond the image repeat its border.
-pub fn shrink(image: &Image<u8>, out: &mut Image<u8>) {
+pub fn shrink(level: Level, image: &Image<u8>, out: &mut Image<u8>) {
     let size = image.size();
     out.resize(size.divided_by(CELL));
-    let whole = size.width / CELL;
     for y in 0..out.height() {
-        let rows: [&[u8]; CELL] =
-            std::array::from_fn(|i| image.row((CELL * y + i).min(size.height - 1)));
-        let (cells, rest) = out.row_mut(y).split_at_mut(whole);
-        let quads = rows.map(|row| row.as_chunks::<CELL>().0);
-        for (x, cell) in cells.iter_mut().enumerate() {
-            let sum: u16 = quads.iter().flat_map(|row| row[x]).map(u16::from).sum();
+        let rows = std::array::from_fn(|i| image.row((CELL * y + i).min(size.height - 1)));
+        dispatch!(level, simd => shrink_row(simd, rows, out.row_mut(y)));
+    }
+}
+
+/// Cells whose pixels fill a vector.
+const CELLS: usize = LANES / CELL;
+
+#[inline(always)]
+fn shrink_row<S: Simd>(simd: S, rows: [&[u8]; CELL], out: &mut [u8]) {
+    let whole = rows[0].len() / LANES * CELLS;
+    for (i, cells) in out[..whole].as_chunks_mut::<CELLS>().0.iter_mut().enumerate() {
+        let at = i * LANES;
+        // Pairs of pixels of four rows: at most 8 * 255.
+        let pairs = (load(simd, rows[0], at).pairwise_widening_add()
+            + load(simd, rows[1], at).pairwise_widening_add())
+            + (load(simd, rows[2], at).pairwise_widening_add()
+                + load(simd, rows[3], at).pairwise_widening_add());
+        let sums = pairs.pairwise_widening_add().to_array();
+        for (cell, sum) in cells.iter_mut().zip(sums) {
             *cell = ((sum + 8) >> 4) as u8;
         }
-        for (i, cell) in rest.iter_mut().enumerate() {
-            let sum: u16 = rows
-                .iter()
-                .flat_map(|row| {
-                    (0..CELL).map(move |k| row[(CELL * (whole + i) + k).min(size.width - 1)])
-                })
-                .map(u16::from)
-                .sum();
-            *cell = ((sum + 8) >> 4) as u8;
+    }
+    for (x, cell) in out.iter_mut().enumerate().skip(whole) {
+        let mut sum = 8;
+        for row in rows {
+            for k in 0..CELL {
+                sum += u16::from(row[(CELL * x + k).min(row.len() - 1)]);
+            }
         }
+        *cell = (sum >> 4) as u8;
     }
 }
 

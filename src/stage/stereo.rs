@@ -56,7 +56,11 @@ impl Stereo {
                 p2: stereo.p2.clamp(stereo.p1, 100) as u8,
             },
             method: match stereo.algorithm {
-                Algorithm::SemiGlobal => Method::EightPaths,
+                Algorithm::SemiGlobal => match stereo.paths {
+                    4 => Method::FourPaths,
+                    5 => Method::FivePaths,
+                    _ => Method::EightPaths,
+                },
                 Algorithm::Block => Method::Block(Measure::Absolute),
                 Algorithm::CensusBlock => Method::Block(Measure::Census),
             },

@@ -18,8 +18,9 @@ use salient_stereo::stage::stereo::{Matches, NO_MATCH, Stereo};
 
 use super::reference::{Noise, ODD_SIZES, stereo as plain};
 
-const METHODS: [Method; 4] = [
+const METHODS: [Method; 5] = [
     Method::EightPaths,
+    Method::FivePaths,
     Method::FourPaths,
     Method::Block(Measure::Census),
     Method::Block(Measure::Absolute),
@@ -359,10 +360,13 @@ fn one_and_two_threads_give_the_same_matches() {
 
 #[test]
 fn cells_are_means_and_repeat_the_border() {
-    for (i, size) in ODD_SIZES.into_iter().enumerate() {
+    let levels = simd::available();
+    let cases =
+        ODD_SIZES.into_iter().flat_map(|size| levels.iter().map(move |&level| (size, level)));
+    for (i, (size, level)) in cases.enumerate() {
         let (image, _) = pair(size, i as u64);
         let mut cells = Image::default();
-        shrink(&image, &mut cells);
+        shrink(level, &image, &mut cells);
         assert_eq!(cells.size(), size.divided_by(CELL));
         for y in 0..cells.height() {
             for x in 0..cells.width() {

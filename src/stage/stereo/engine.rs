@@ -10,6 +10,7 @@ use crate::stage::stereo::census::Census;
 use crate::stage::stereo::cost::Penalties;
 use crate::stage::stereo::horizontal::Horizontal;
 use crate::stage::stereo::plan::{Band, Plan, Run};
+use crate::stage::stereo::vertical::Direction::{Down, Up};
 use crate::stage::stereo::vertical::Vertical;
 use crate::stage::stereo::volume::{RunShape, Seeds, Volume, Weight};
 use crate::stage::stereo::winner::{RightWinner, winners};
@@ -35,6 +36,8 @@ pub struct Settings {
 pub enum Method {
     /// Along eight paths.
     EightPaths,
+    /// Along five paths: all but those from below.
+    FivePaths,
     /// Along the four paths parallel to the image axes.
     FourPaths,
     /// Over a block.
@@ -234,13 +237,26 @@ impl Scratch {
         match settings.method {
             Method::EightPaths => {
                 h.run(simd, &shape, penalties, left, right, seeds, volume);
-                v.down::<S, true>(simd, &shape, penalties, left, right, seeds, volume);
-                v.up::<S, true>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+                v.sweep::<S, true>(simd, Down, &shape, penalties, left, right, seeds, volume, None);
+                let finish = Some(&mut finish);
+                v.sweep::<S, true>(simd, Up, &shape, penalties, left, right, seeds, volume, finish);
+            }
+            Method::FivePaths => {
+                h.run(simd, &shape, penalties, left, right, seeds, volume);
+                let finish = Some(&mut finish);
+                v.sweep::<S, true>(
+                    simd, Down, &shape, penalties, left, right, seeds, volume, finish,
+                );
             }
             Method::FourPaths => {
                 h.run(simd, &shape, penalties, left, right, seeds, volume);
-                v.down::<S, false>(simd, &shape, penalties, left, right, seeds, volume);
-                v.up::<S, false>(simd, &shape, penalties, left, right, seeds, volume, &mut finish);
+                v.sweep::<S, false>(
+                    simd, Down, &shape, penalties, left, right, seeds, volume, None,
+                );
+                let finish = Some(&mut finish);
+                v.sweep::<S, false>(
+                    simd, Up, &shape, penalties, left, right, seeds, volume, finish,
+                );
             }
             Method::Block(measure) => {
                 block::run(simd, measure, &shape, left, right, volume);

@@ -37,6 +37,15 @@ pub struct Vertical {
 /// in `Vertical::sums`.
 type Floors<S> = u8x32<S>;
 
+/// Which way a sweep goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Direction {
+    /// From the upper rows to the lower ones.
+    Down,
+    /// From the lower rows to the upper ones.
+    Up,
+}
+
 /// Rows of a sweep: the one at work and the one its paths come from.
 struct Step {
     row: usize,
@@ -44,82 +53,64 @@ struct Step {
 }
 
 impl Vertical {
-    /// Adds the paths from above to `volume`.
+    /// Adds the paths of `direction` to `volume`, row by row. If they are the last
+    /// ones, `finish` gets every finished row of a tile instead, and `volume` stays
+    /// as it is.
     #[inline(always)]
     #[allow(clippy::too_many_arguments, reason = "the inputs of one kernel")]
-    pub fn down<S: Simd, const DIAGONALS: bool>(
+    pub fn sweep<S: Simd, const DIAGONALS: bool>(
         &mut self,
         simd: S,
+        direction: Direction,
         shape: &RunShape<'_>,
         penalties: Penalties,
         left: &Census,
         right: &Census,
         seeds: Option<&Seeds<'_>>,
         volume: &mut Volume,
+        mut finish: Option<&mut Finish<'_>>,
     ) {
         self.reset::<DIAGONALS>(shape);
+        let rows = shape.context_above..shape.context_above + shape.rows;
+        let all = match direction {
+            Direction::Down => 0..rows.end,
+            Direction::Up => rows.start..rows.end + shape.context_below,
+        };
+        let row_at = |i: usize| match direction {
+            Direction::Down => all.start + i,
+            Direction::Up => all.end - 1 - i,
+        };
         if let Some(seeds) = seeds {
-            self.seed::<DIAGONALS>(shape, penalties, seeds, seeds.y0 - shape.context_above);
+            let y = seeds.y0 + row_at(0) - shape.context_above;
+            self.seed::<DIAGONALS>(shape, penalties, seeds, y);
         }
-        for row in 0..shape.context_above + shape.rows {
-            let step = Step { row, from: row.saturating_sub(1) };
+        for i in 0..all.len() {
+            let step = Step { row: row_at(i), from: row_at(i.saturating_sub(1)) };
+            let row = rows.contains(&step.row).then(|| step.row - rows.start);
             for (k, tile) in shape.tiles.iter().enumerate() {
                 let floor =
                     self.tile::<S, DIAGONALS>(simd, shape, penalties, left, right, &step, k, tile);
-                if row < shape.context_above {
-                    continue;
-                }
-                let y = row - shape.context_above;
-                for (out, sum) in volume.row_mut(k, y).iter_mut().zip(&self.sums) {
-                    let sum = load_block(simd, sum).saturating_sub(floor);
-                    load_block(simd, out).saturating_add(sum).store_array(out);
-                }
+                let Some(y) = row else { continue };
                 add_floors(volume.floor_mut(k, y), floor);
-            }
-            self.turn();
-        }
-    }
-
-    /// Completes the sums of `volume` by the paths from below, row by row from
-    /// the last one up, and hands every finished row of a tile to `finish`.
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "the inputs of one kernel")]
-    pub fn up<S: Simd, const DIAGONALS: bool>(
-        &mut self,
-        simd: S,
-        shape: &RunShape<'_>,
-        penalties: Penalties,
-        left: &Census,
-        right: &Census,
-        seeds: Option<&Seeds<'_>>,
-        volume: &mut Volume,
-        finish: &mut Finish<'_>,
-    ) {
-        self.reset::<DIAGONALS>(shape);
-        let end = shape.context_above + shape.rows + shape.context_below;
-        if let Some(seeds) = seeds {
-            let last = seeds.y0 + shape.rows + shape.context_below - 1;
-            self.seed::<DIAGONALS>(shape, penalties, seeds, last);
-        }
-        for row in (shape.context_above..end).rev() {
-            let step = Step { row, from: (row + 1).min(end - 1) };
-            for (k, tile) in shape.tiles.iter().enumerate() {
-                let floor =
-                    self.tile::<S, DIAGONALS>(simd, shape, penalties, left, right, &step, k, tile);
-                let y = row - shape.context_above;
-                if y >= shape.rows {
-                    continue;
+                match &mut finish {
+                    None => {
+                        for (out, sum) in volume.row_mut(k, y).iter_mut().zip(&self.sums) {
+                            let sum = load_block(simd, sum).saturating_sub(floor);
+                            load_block(simd, out).saturating_add(sum).store_array(out);
+                        }
+                    }
+                    Some(finish) => {
+                        for (sum, before) in self.sums.iter_mut().zip(volume.row(k, y)) {
+                            let cost = load_block(simd, sum).saturating_sub(floor);
+                            load_block(simd, before).saturating_add(cost).store_array(sum);
+                        }
+                        let floors = *volume.floor_mut(k, y);
+                        finish.row(simd, k, y, &self.sums[..tile.n], &floors);
+                    }
                 }
-                for (sum, before) in self.sums.iter_mut().zip(volume.row(k, y)) {
-                    let cost = load_block(simd, sum).saturating_sub(floor);
-                    load_block(simd, before).saturating_add(cost).store_array(sum);
-                }
-                add_floors(volume.floor_mut(k, y), floor);
-                let floors = *volume.floor_mut(k, y);
-                finish.row(simd, k, y, &self.sums[..tile.n], &floors);
             }
-            if row < shape.context_above + shape.rows {
-                finish.vote(simd, row - shape.context_above);
+            if let (Some(y), Some(finish)) = (row, &mut finish) {
+                finish.vote(simd, y);
             }
             self.turn();
         }

@@ -179,33 +179,25 @@ pub fn winners<S: Simd>(
     let mut before = load_block(simd, &costs[0]);
     let (mut best, mut smaller, mut larger) = (before, before, before);
     let mut index = u8x32::splat(simd, 0);
-    if n > 1 {
-        let mut cost = load_block(simd, &costs[1]);
-        for (i, after) in costs.iter().enumerate().skip(2) {
-            let after = load_block(simd, after);
-            let better = cost.simd_lt(best);
-            best = best.min(cost);
-            index = better.select(u8x32::splat(simd, ((i - 1) >> shift) as u8), index);
-            smaller = better.select(before, smaller);
-            larger = better.select(after, larger);
-            before = cost;
-            cost = after;
-        }
+    // The second best that is no neighbour of the best: of those two and more
+    // below it when it was found, and of those two and more above it since.
+    let mut second = u8x32::splat(simd, 255);
+    let mut below = second;
+    let mut fresh = second.simd_eq(second);
+    for i in 1..n {
+        let cost = load_block(simd, &costs[i]);
+        let after = load_block(simd, &costs[(i + 1).min(n - 1)]);
         let better = cost.simd_lt(best);
         best = best.min(cost);
-        index = better.select(u8x32::splat(simd, ((n - 1) >> shift) as u8), index);
-        smaller = better.select(cost, smaller);
-        larger = better.select(cost, larger);
-    }
-    // The second best that is no neighbour of the best.
-    let mut second = u8x32::splat(simd, 255);
-    let one = u8x32::splat(simd, 1);
-    let (from, to) = (index.saturating_sub(one), index.saturating_add(one));
-    for (i, cost) in costs.iter().enumerate() {
-        let i = u8x32::splat(simd, (i >> shift) as u8);
-        let near = i.max(from).min(to).simd_eq(i);
-        let cost = load_block(simd, cost);
-        second = second.min(near.select(u8x32::splat(simd, 255), cost));
+        index = better.select(u8x32::splat(simd, (i >> shift) as u8), index);
+        // At the end of the range, `after` is the best itself.
+        let inner = i + 1 < n;
+        smaller = better.select(if inner { before } else { cost }, smaller);
+        larger = better.select(after, larger);
+        second = better.select(below, fresh.select(second, second.min(cost)));
+        below = below.min(before);
+        fresh = better;
+        before = cost;
     }
     let (best, second, index) = (best.to_array(), second.to_array(), index.to_array());
     let (smaller, larger) = (smaller.to_array(), larger.to_array());

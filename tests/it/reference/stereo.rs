@@ -191,16 +191,21 @@ impl<'a> Domain<'a> {
             }
             return sums;
         }
-        let diagonals = self.settings.method == Method::EightPaths;
+        let diagonals = self.settings.method != Method::FourPaths;
         let horizontal = [self.path(1, 0), self.path(-1, 0)];
-        let sweeps = [1, -1].map(|dy| {
-            let mut paths = vec![self.path(0, dy)];
-            if diagonals {
-                paths.push(self.path(1, dy));
-                paths.push(self.path(-1, dy));
-            }
-            paths
-        });
+        let directions =
+            if self.settings.method == Method::FivePaths { &[1][..] } else { &[1, -1] };
+        let sweeps: Vec<_> = directions
+            .iter()
+            .map(|&dy| {
+                let mut paths = vec![self.path(0, dy)];
+                if diagonals {
+                    paths.push(self.path(1, dy));
+                    paths.push(self.path(-1, dy));
+                }
+                paths
+            })
+            .collect();
         for p in points() {
             let mut floors = 0;
             let mut costs: HashMap<usize, u8> = self.range(p.0).map(|d| (d, 0)).collect();
@@ -317,15 +322,8 @@ fn winner(
     if c0 == 255 {
         return None;
     }
-    // Long ranges are looked at in steps of two or four.
-    let step = if range.len() > 512 { 4 } else { 1 + usize::from(range.len() > 256) };
-    let bin = |d: usize| (d - range.start) / step;
-    let second = range
-        .clone()
-        .filter(|&d| bin(d).abs_diff(bin(best)) > 1)
-        .map(|d| costs[&d])
-        .min()
-        .unwrap_or(255);
+    let second =
+        range.clone().filter(|d| d.abs_diff(best) > 1).map(|d| costs[&d]).min().unwrap_or(255);
     let (first, second) = (u32::from(c0) + floors, u32::from(second) + floors);
     let evidence = if 100 * second < (100 + uniqueness_ratio) * first {
         0
