@@ -6,7 +6,8 @@
 # DATA holds whatever there is of the published folders, as
 #   kitti2012/  kitti2015/  middlebury*/  sintel/  spring/  davis/  duts/DUTS-TR/
 # and our own bags are always measured. OPTIONs go to `salient_stereo evaluate` (--threads 1, --set …).
-# OpenCV's rows need a Python with opencv-python-headless and numpy: set PYTHON; without it they are left out.
+# OpenCV's rows and the matcher's table need a Python with opencv-python-headless, numpy, mcap and mcap-ros2-support:
+# set PYTHON; without it they are left out.
 # Finished scenes are kept in out/evaluation: run it again after an interruption. Exit code 3: everything was
 # written, and scenes that could not be read are named above.
 set -euo pipefail
@@ -41,7 +42,7 @@ if [ -n "${PYTHON:-}" ]; then
     while read -r image; do scenes+=("$(dirname "$image")"); done < <(
         find -L "$data"/middlebury* -name mask0nocc.png -o -name groundtruth.png -o -name disp1.png -o -name '*GT.png' | sort)
     mkdir -p out
-    "$PYTHON" benches/peers/stereo.py "${scenes[@]}" --json out/peers.json >out/peers.md
+    "$PYTHON" benches/peers/stereo.py "${scenes[@]}" --tool "$tool" --readme README.md --json out/peers.json >out/peers.md
     peers=(--peers out/peers.json)
 fi
 

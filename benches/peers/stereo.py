@@ -11,7 +11,7 @@ Without --bag and --tool only OpenCV is measured, and --json writes its rows for
 
 With --bag our disparity is read from an output bag of `salient_stereo replay` (topic /disparity) and scored
 where we matched; with --tool the script runs the tool itself: `export-bag` and `replay` for the disparity of the
-full frame (KITTI only), scored in centred rectangles as well, and `bench` for the time. Prints Markdown.
+full frame, scored in centred rectangles as well, and `bench` for the time. Prints Markdown.
 
 Columns: EPE is the mean error in px, D1 the share of errors above 3 px and 5 %, bad-2 that above 2 px, all on
 non-occluded pixels that the method itself calls valid; "dense" is their share of the true pixels. "Same" columns
@@ -229,14 +229,19 @@ def read_bag(path, frame):
 
 def replay(tool, scene, disparities, work):
     """Runs our own matcher over the full frame; returns disparity and confidence."""
-    folder, name, frame = scene.kitti
-    kind = "kitti2012" if (Path(folder) / "training" / "image_0").is_dir() else "kitti2015"
     bag, out = work / "in.mcap", work / "out.mcap"
+    if scene.kitti:
+        folder, name, _ = scene.kitti
+        kind = "kitti2012" if (Path(folder) / "training" / "image_0").is_dir() else "kitti2015"
+        source = ["--dataset", kind, "--scene", name, folder]
+    else:
+        # Depth plays no part here: any focal length and baseline will do.
+        source = ["--left", scene.left, "--right", scene.right, "--focal", 1000, "--baseline", 0.1, "--offset", 0]
 
     def run(*args):
         subprocess.run([str(a) for a in (tool, *args)], check=True, stdout=subprocess.DEVNULL)
 
-    run("export-bag", "--dataset", kind, "--scene", name, folder, "-o", bag)
+    run("export-bag", *source, "-o", bag)
     run("replay", bag, "-o", out, "--set", "saliency.mode=full_frame",
         "--set", f"stereo.disparity_range={disparities}")
     return read_bag(out, scene.position())
@@ -251,8 +256,41 @@ def bench(tool, scene, fraction, disparities, frames, threads):
     return matching["p50"] if isinstance(matching, dict) else matching
 
 
-def measure(scene, args, peers):
-    """Prints the tables of one scene and adds the rows of the others to `peers`."""
+PEER = "SGBM + speckle filter"
+
+
+def summary(rows, args):
+    """The figures of all scenes in one table per rectangle."""
+    lines = [f"Ranges 0..{args.disparities}; {args.rounds} interleaved rounds, medians; OpenCV {cv2.__version__} on one "
+             "thread. EPE, D1, bad-2 and density over non-occluded pixels; filled: all true pixels after every hole took "
+             "the smaller disparity of its row neighbours. Pairs of figures: we / OpenCV SGBM + speckle filter."]
+    for fraction in args.roi or [0.25, 1.0]:
+        where = "full frame" if fraction >= 1 else f"centred {100 * fraction:.0f} %"
+        lines += ["", f"| {where} | times faster than SGBM, 1 / 2 threads | EPE px | D1 % | bad-2 % | dense % "
+                  "| filled EPE px | filled D1 % | AUSE |", "|---|---|---|---|---|---|---|---|---|"]
+        for row in rows:
+            one, two = (row["faster"].get((fraction, threads), float("nan")) for threads in (1, 2))
+            (epe, d1, bad, dense), (peer_epe, peer_d1, peer_bad, peer_dense) = row["errors"][where]
+            (filled_epe, filled_d1), (peer_filled_epe, peer_filled_d1) = row["filled"][where]
+            lines.append(
+                f"| {row['name']} | {one:.1f} / {two:.1f} | {epe:.2f} / {peer_epe:.2f} | {d1:.1f} / {peer_d1:.1f} "
+                f"| {bad:.1f} / {peer_bad:.1f} | {dense:.1f} / {peer_dense:.1f} | {filled_epe:.2f} / {peer_filled_epe:.2f} "
+                f"| {filled_d1:.1f} / {peer_filled_d1:.1f} | {row['ause'][where]:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+def splice(path, text):
+    """Puts `text` between the lines `<!-- matcher: begin … -->` and `<!-- matcher: end -->` of a file."""
+    lines = Path(path).read_text().splitlines(keepends=True)
+    marks = [[i for i, line in enumerate(lines) if line.startswith(f"<!-- matcher: {mark}")] for mark in ("begin", "end")]
+    if [len(mark) for mark in marks] != [1, 1] or marks[0][0] > marks[1][0]:
+        sys.exit(f"{path}: one line `<!-- matcher: begin -->` and one `<!-- matcher: end -->` after it expected")
+    (begin,), (end,) = marks
+    Path(path).write_text("".join([*lines[:begin + 1], "\n", text, "\n", *lines[end:]]))
+
+
+def measure(scene, args, peers, rows):
+    """Prints the tables of one scene, adds the rows of the others to `peers` and the summary to `rows`."""
     left, right = gray(scene.left), gray(scene.right)
     matchers = opencv_matchers(args.disparities)
     fractions = args.roi or [0.25, 1.0]
@@ -306,13 +344,19 @@ def measure(scene, args, peers):
             frame = scene.position()
         disparity, confidence = read_bag(args.bag, frame)
         jobs.append(("where the bag has disparity", ~np.isnan(disparity), disparity, confidence))
-    if args.tool and scene.kitti:
+    if args.tool:
         with tempfile.TemporaryDirectory() as work:
             disparity, confidence = replay(args.tool, scene, args.disparities, Path(work))
         for fraction in fractions:
             where = "full frame" if fraction >= 1 else f"centred {100 * fraction:.0f} %"
             jobs.append((where, centred(left.shape, fraction), disparity, confidence))
+    total = {"name": scene.scene, "errors": {}, "filled": {}, "ause": {}}
+    total["faster"] = {key: reference / statistics.median(values) for key, values in ours.items() if values}
     for where, mask, disparity, confidence in jobs:
+        pair = (disparity, found[PEER])
+        total["errors"][where] = [errors(d, scene.noc, mask) for d in pair]
+        total["filled"][where] = [errors(filled(d), scene.occ, mask)[:2] for d in pair]
+        total["ause"][where] = float("nan")
         print(f"**{where}**\n")
         print("| matcher | EPE px | D1 % | bad-2 % | dense % | same EPE: it / we | same D1: it / we "
               "| filled EPE | filled D1 % |\n|---|---|---|---|---|---|---|---|---|")
@@ -325,8 +369,10 @@ def measure(scene, args, peers):
                   f"| {it[1]:.2f} / {we[1]:.2f} | {all_epe:.3f} | {all_d1:.2f} |")
         if confidence is not None:
             area = sparsification(disparity, confidence, scene.noc, mask)
+            total["ause"][where] = area
             print(f"\nConfidence of salient_stereo: AUSE {area:.3f} (0: as good as knowing the error).")
         print()
+    rows.append(total)
 
 
 def main():
@@ -341,15 +387,23 @@ def main():
     parser.add_argument("--disparities", type=int, default=192)
     parser.add_argument("--rounds", type=int, default=5, help="interleaved rounds of timing")
     parser.add_argument("--json", help="write OpenCV's rows here, for `salient_stereo evaluate --peers`")
+    parser.add_argument("--readme", help="write the table of all scenes between the matcher's markers of this file")
     args = parser.parse_args()
+    if args.readme and not args.tool:
+        parser.error("--readme needs --tool")
 
     cv2.setNumThreads(1)
     scenes = [scene for folder in args.folder for scene in scenes_of(folder, args.scene, args.frame)]
     if args.bag and len(scenes) != 1:
         parser.error("a bag holds one scene: name it with --scene")
-    peers = []
+    peers, rows = [], []
     for scene in scenes:
-        measure(scene, args, peers)
+        measure(scene, args, peers, rows)
+    if args.tool:
+        text = summary(rows, args)
+        print(text)
+        if args.readme:
+            splice(args.readme, text)
     if args.json:
         Path(args.json).write_text(json.dumps({"peers": peers}, indent=1))
 
