@@ -1,5 +1,7 @@
 //! Quarter-size disparity of the whole frame.
 
+use rayon::prelude::*;
+
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{DISPARITY_STEP, View};
@@ -16,6 +18,9 @@ pub const CELL: usize = 4;
 
 /// Neighbours that a cell needs.
 const SUPPORT: u32 = 2;
+
+/// Least rows of cells that are worth a task of their own.
+const ROWS_AT_ONCE: usize = 24;
 
 /// Cells that are looked at together.
 const BLOCK: usize = 64;
@@ -133,9 +138,10 @@ fn check(matches: &Matches, out: &mut Image<f32>) {
     let size = matches.left.size();
     out.resize(size);
     let pixels_per_step = CELL as f32 * DISPARITY_STEP;
-    for y in 0..size.height {
+    let rows = out.pixels_mut().par_chunks_exact_mut(size.width.max(1)).enumerate();
+    rows.with_min_len(ROWS_AT_ONCE).for_each(|(y, out)| {
         let right = matches.right.row(y);
-        for (x, (out, &d)) in out.row_mut(y).iter_mut().zip(matches.left.row(y)).enumerate() {
+        for (x, (out, &d)) in out.iter_mut().zip(matches.left.row(y)).enumerate() {
             let partner = x as i32 - (i32::from(d) + STEPS / 2).div_euclid(STEPS);
             let agreed = d != NO_MATCH
                 && usize::try_from(partner)
@@ -144,7 +150,7 @@ fn check(matches: &Matches, out: &mut Image<f32>) {
                     .is_some_and(|&r| (i32::from(d) - i32::from(r)).abs() <= STEPS);
             *out = if agreed { f32::from(d) * pixels_per_step } else { f32::NAN };
         }
-    }
+    });
 }
 
 /// Drops cells that fewer than [`SUPPORT`] of the eight around them bear out to
@@ -156,12 +162,13 @@ fn support(agreed: &Image<f32>, out: &mut Image<f32>) {
     if width < 3 || height < 3 {
         return;
     }
-    for y in 0..height {
+    let rows = out.pixels_mut().par_chunks_exact_mut(width).enumerate();
+    rows.with_min_len(ROWS_AT_ONCE).for_each(|(y, out)| {
         let nowhere = &agreed.row(y)[..0];
         let above = if y > 0 { agreed.row(y - 1) } else { nowhere };
         let below = if y + 1 < height { agreed.row(y + 1) } else { nowhere };
-        support_row(above, agreed.row(y), below, out.row_mut(y));
-    }
+        support_row(above, agreed.row(y), below, out);
+    });
 }
 
 /// One row of it; nothing is above or below where that row is empty. The first

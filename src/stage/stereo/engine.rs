@@ -87,6 +87,13 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
+    /// No match anywhere.
+    fn clear(&mut self) {
+        self.left.fill(NO_MATCH);
+        self.right.fill(NO_MATCH);
+        self.evidence.fill(0);
+    }
+
     fn split(self, y: usize) -> (Self, Self) {
         let at = (y - self.y0) * self.width;
         let (left, left_rest) = self.left.split_at_mut(at);
@@ -115,11 +122,8 @@ impl Engine {
     pub fn run(&mut self, views: &Views<'_>, plan: &Plan, out: &mut Matches) {
         let size = views.left.size();
         out.left.resize(size);
-        out.left.fill(NO_MATCH);
         out.right.resize(size);
-        out.right.fill(NO_MATCH);
         out.evidence.resize(size);
-        out.evidence.fill(0);
         let threads = rayon::current_num_threads();
         while self.scratch.len() < threads {
             self.scratch.push(Mutex::default());
@@ -134,9 +138,9 @@ impl Engine {
         self.bands(views, plan, &plan.bands, rows);
     }
 
-    fn bands(&self, views: &Views<'_>, plan: &Plan, bands: &[Band], rows: Rows<'_>) {
+    fn bands(&self, views: &Views<'_>, plan: &Plan, bands: &[Band], mut rows: Rows<'_>) {
         match bands {
-            [] => {}
+            [] => rows.clear(),
             [band] => self.band(views, plan, band, rows),
             _ => {
                 let (upper, lower) = bands.split_at(bands.len() / 2);
@@ -149,7 +153,9 @@ impl Engine {
         }
     }
 
-    fn band(&self, views: &Views<'_>, plan: &Plan, band: &Band, rows: Rows<'_>) {
+    /// Matches one band; all of `rows`, above and below it too, are written.
+    fn band(&self, views: &Views<'_>, plan: &Plan, band: &Band, mut rows: Rows<'_>) {
+        rows.clear();
         let index = rayon::current_thread_index().unwrap_or(0) % self.scratch.len();
         // A poisoned lock means that another frame's band panicked; the
         // buffers are overwritten in any case.
