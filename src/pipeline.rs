@@ -163,6 +163,7 @@ impl Pipeline {
             saliency: &out.saliency,
             roi: &out.roi,
             disparity: &out.disparity,
+            coarse: &self.coarse_disparity,
             confidence: &out.confidence,
             depth: &out.depth,
             rig: &out.rig,

@@ -11,6 +11,7 @@ use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{Region, RegionList, Rejections, RoiMask};
+use crate::stage::coarse::CoarseDisparity;
 use crate::stage::ground::Plane;
 use components::{Candidates, Components};
 use contour::Contour;
@@ -38,6 +39,8 @@ pub struct RegionSource<'a> {
     pub roi: &'a RoiMask,
     /// Disparity in pixels, NaN where there is none.
     pub disparity: &'a Image<f32>,
+    /// Disparity of the whole frame, coarser.
+    pub coarse: &'a CoarseDisparity,
     /// Confidence of the disparity.
     pub confidence: &'a Image<f32>,
     /// Depth in metres, NaN, +Inf, -Inf as in `Perception::depth`.

@@ -8,6 +8,7 @@ use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::{RegionList, Rejections, RoiMask};
+use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::depth::Depth;
 use salient_stereo::stage::regions::components::{Candidates, Components, agree};
 use salient_stereo::stage::regions::contour::Contour;
@@ -312,6 +313,7 @@ impl Boxes {
             saliency: &self.saliency,
             roi: &roi,
             disparity: &self.disparity,
+            coarse: &CoarseDisparity::default(),
             confidence: &self.confidence,
             depth: &depth,
             rig: &rig,

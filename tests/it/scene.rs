@@ -112,6 +112,22 @@ fn what_stands_is_found_and_what_floats_is_counted() {
     assert_eq!(things.ids.get(80, 58), 0);
 }
 
+#[test]
+fn parked_cars_are_two_and_the_house_behind_them_is_none() {
+    let rig = rig();
+    // Two cars one behind the other, and a house front that goes up out of the picture.
+    let boxes =
+        [[1.6, 3.4, 0.0, 1.5, 6.0], [1.6, 3.4, 0.0, 1.5, 12.0], [-9.0, 9.0, 0.0, 9.0, 20.0]];
+    let disparity = street(0.0, &boxes);
+    let mut ground = Ground::default();
+    ground.run(&disparity, &rig);
+    let plane = *ground.plane().expect("a street has a ground");
+    let mut things = Things::default();
+    Standing::default().run(&disparity, &plane, &rig, 4, &mut things);
+    let nearest: Vec<_> = things.list.iter().map(|t| t.depth_m[0].round()).collect();
+    assert_eq!(nearest, [12.0, 6.0]);
+}
+
 /// The barrier of one channel over three raster scans, one value at a time.
 fn plain_barrier(values: &[u8], width: usize, height: usize) -> Vec<u8> {
     let border = |x: usize, y: usize| x == 0 || y == 0 || x + 1 == width || y + 1 == height;

@@ -50,6 +50,7 @@ impl Upright {
     fn shrink(&mut self, source: &RegionSource<'_>) {
         let size = source.disparity.size();
         self.cells.resize(size.divided_by(CELL));
+        let offset = source.rig.disparity_offset() as f32;
         for cy in 0..self.cells.height() {
             for cx in 0..self.cells.width() {
                 let (x0, y0) = (cx * CELL, cy * CELL);
@@ -72,7 +73,9 @@ impl Upright {
                     sorted[at] = d;
                     n += 1;
                 }
-                let median = if n < LEAST_SAMPLES { f32::NAN } else { sorted[n / 2] };
+                // What was not matched finely is known coarsely.
+                let coarse = || source.coarse.checked.get(cx, cy) - offset;
+                let median = if n < LEAST_SAMPLES { coarse() } else { sorted[n / 2] };
                 self.cells.set(cx, cy, median);
             }
         }

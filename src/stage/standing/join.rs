@@ -1,0 +1,200 @@
+//! Which segments are one thing.
+
+use super::column::{Columns, Segment, Top};
+use crate::camera::StereoRig;
+use crate::stage::coarse::CELL;
+use crate::stage::regions::union_find::UnionFind;
+
+/// Gap in metres across which segments beside each other are one thing.
+const GAP_M: f32 = 0.5;
+/// Their difference in depth: metres, in parts of the depth, and in standard
+/// deviations of a segment's disparity, pixels.
+const STEP_M: f32 = 0.5;
+const STEP_PART: f32 = 0.04;
+const STEP_PX: f32 = 0.35;
+/// Height of a segment that alone is evidence of a thing, metres.
+const STRONG_M: f32 = 0.4;
+/// Share of a part's columns that must stand on another part of the same thing.
+const LEAST_LINK: f32 = 0.5;
+/// How much lower than the top of the part in front an upper part may begin, metres.
+const SINK_M: f32 = 0.15;
+/// How far behind its lower part a thing's upper part may begin (a windscreen
+/// behind a bonnet), metres.
+const SETBACK_M: f32 = 1.5;
+/// Cells without disparity between such parts.
+const MAX_HOLES: usize = 2;
+
+/// The joining of segments, with its buffers.
+#[derive(Debug, Default)]
+pub struct Join {
+    sets: UnionFind,
+    strong: Vec<bool>,
+    widths: Vec<u32>,
+    links: Vec<u64>,
+}
+
+impl Join {
+    /// Segments beside each other at one depth, and parts above each other.
+    ///
+    /// Where one surface hides another, cells hold a mixture of both. Such
+    /// pieces are short: they take a thing, but never make one of two.
+    pub fn run(&mut self, columns: &Columns, scale: f32, rig: &StereoRig) {
+        let view = View::new(scale, rig);
+        self.strong.clear();
+        let least = STRONG_M * scale;
+        self.strong.extend(columns.segments.iter().map(|s| {
+            let rows = (s.lower - s.upper) as f32 * CELL as f32;
+            rows * view.distance(s) >= least * view.focal
+        }));
+        self.sets.reset(columns.segments.len());
+        self.beside(columns, &view);
+        self.above(columns, &view);
+        self.attach(columns, &view);
+    }
+
+    /// Strong segments side by side.
+    fn beside(&mut self, columns: &Columns, view: &View) {
+        let Columns { segments, first } = columns;
+        for (i, s) in segments.iter().enumerate().filter(|(i, _)| self.strong[*i]) {
+            let column = s.x as usize;
+            let reach = view.columns(GAP_M, s);
+            let from = first[column.saturating_sub(reach)] as usize;
+            for j in (from..first[column] as usize).filter(|j| self.strong[*j]) {
+                if view.beside(s, &segments[j]) {
+                    self.sets.union(j as u32, i as u32);
+                }
+            }
+        }
+    }
+
+    /// Sets of strong segments of which one stands on the other along most of its width.
+    fn above(&mut self, columns: &Columns, view: &View) {
+        let Columns { segments, first } = columns;
+        self.widths.clear();
+        self.widths.resize(segments.len(), 0);
+        self.links.clear();
+        for x in 0..first.len() - 1 {
+            let column = first[x] as usize..first[x + 1] as usize;
+            let mut below: Option<usize> = None;
+            for i in column.filter(|i| self.strong[*i]) {
+                let set = self.sets.find(i as u32);
+                self.widths[set as usize] += 1;
+                if let Some(j) = below
+                    && view.above(&segments[j], &segments[i])
+                {
+                    let other = self.sets.find(j as u32);
+                    if other != set {
+                        self.links
+                            .push((u64::from(other.min(set)) << 32) | u64::from(other.max(set)));
+                    }
+                }
+                below = Some(i);
+            }
+        }
+        self.links.sort_unstable();
+        for same in self.links.chunk_by(|a, b| a == b) {
+            let (a, b) = ((same[0] >> 32) as u32, same[0] as u32);
+            let width = self.widths[a as usize].min(self.widths[b as usize]);
+            if same.len() as f32 >= LEAST_LINK * width as f32 {
+                self.sets.union(a, b);
+            }
+        }
+    }
+
+    /// The other segments: each to the neighbour nearest in depth.
+    fn attach(&mut self, columns: &Columns, view: &View) {
+        let Columns { segments, first } = columns;
+        for (i, s) in segments.iter().enumerate().filter(|(i, _)| !self.strong[*i]) {
+            let column = s.x as usize;
+            let mut best = (f32::INFINITY, None);
+            let from = first[column.saturating_sub(1)] as usize;
+            let to = first[(column + 2).min(first.len() - 1)] as usize;
+            for (j, t) in (from..to).zip(&segments[from..to]) {
+                let step = (view.distance(s) - view.distance(t)).abs();
+                let touches = if t.x == s.x {
+                    view.above(s, t) || view.above(t, s)
+                } else {
+                    view.beside(s, t)
+                };
+                if j != i && step < best.0 && (self.strong[j] || j < i) && touches {
+                    best = (step, Some(j));
+                }
+            }
+            if let Some(j) = best.1 {
+                self.sets.union(j as u32, i as u32);
+            }
+        }
+    }
+
+    /// The set that a segment belongs to, by the index of its first segment.
+    pub fn set_of(&mut self, segment: u32) -> u32 {
+        self.sets.find(segment)
+    }
+}
+
+/// What is needed to reckon with segments in space.
+struct View {
+    scale: f32,
+    depth_scale: f32,
+    focal: f32,
+    cx: f32,
+}
+
+impl View {
+    fn new(scale: f32, rig: &StereoRig) -> Self {
+        Self {
+            scale,
+            depth_scale: rig.depth_scale() as f32,
+            focal: rig.focal_px() as f32,
+            cx: rig.principal_point().0 as f32,
+        }
+    }
+
+    /// Along the optical axis, metres.
+    fn distance(&self, s: &Segment) -> f32 {
+        self.depth_scale / s.disparity()
+    }
+
+    /// Columns of cells across `length_m` metres of a road scene at a segment.
+    fn columns(&self, length_m: f32, s: &Segment) -> usize {
+        (length_m * self.scale * self.focal / self.distance(s) / CELL as f32) as usize + 1
+    }
+
+    /// Whether segments of different columns are one surface.
+    fn beside(&self, s: &Segment, t: &Segment) -> bool {
+        if s.lower.min(t.lower) <= s.upper.max(t.upper) {
+            return false;
+        }
+        let (zs, zt) = (self.distance(s), self.distance(t));
+        let (near, far) = (zs.min(zt), zs.max(zt));
+        // d Z = Z² / (f B) d d
+        let noise = STEP_PX * far * far / self.depth_scale;
+        let mut step = (STEP_M * self.scale).max(STEP_PART * far).max(noise);
+        if s.x.abs_diff(t.x) == 1 {
+            // A surface parallel to the axis recedes by as much as its
+            // columns approach the centre; nothing that is visible recedes faster.
+            let (us, ut) = (self.offset(s), self.offset(t));
+            if us * ut > 0.0 && (us.abs() < ut.abs()) == (zs > zt) {
+                let receding = near * ((us / ut).max(ut / us) - 1.0);
+                step = step.max(1.2 * receding + 0.5 * noise);
+            }
+        }
+        far - near <= step
+    }
+
+    /// Columns from the principal point, pixels.
+    fn offset(&self, s: &Segment) -> f32 {
+        (s.x as usize * CELL) as f32 + 1.5 - self.cx
+    }
+
+    /// Whether `upper` is a part of what `lower` is of, in the same column.
+    fn above(&self, lower: &Segment, upper: &Segment) -> bool {
+        let setback = self.distance(upper) - self.distance(lower);
+        let near = lower.upper.abs_diff(upper.lower) as usize <= MAX_HOLES;
+        // A surface that only leans back rises on the way; what begins lower
+        // than the edge in front of it is something else behind it.
+        let rises = upper.bottom_m >= lower.top_m - SINK_M * self.scale;
+        let back = SETBACK_M * self.scale;
+        near && rises && upper.top != Top::Tall && (-0.3 * back..back).contains(&setback)
+    }
+}
