@@ -13,7 +13,7 @@ use crate::stage::regions::{RegionSource, Regions};
 use crate::stage::roi::Roi;
 use crate::stage::saliency::{Previous, Saliency, Scene};
 use crate::stage::stereo::{Matches, Stereo};
-use crate::stage::track::Track;
+use crate::stage::track::{self, Track};
 
 /// The stages and their buffers for pictures of one size.
 ///
@@ -172,7 +172,8 @@ impl Pipeline {
         self.regions.run(&source, &mut out.labels, &mut out.regions, &mut out.rejections);
         lap.mark(&mut out.times, Stage::Regions);
 
-        self.track.run(frame.stamp, &out.rig, &mut out.regions, &mut out.rejections);
+        let views = track::Views { disparity: &out.disparity, labels: &out.labels };
+        self.track.run(frame.stamp, &out.rig, views, &mut out.regions, &mut out.rejections);
         lap.mark(&mut out.times, Stage::Track);
     }
 }

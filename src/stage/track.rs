@@ -5,6 +5,7 @@ pub mod kalman;
 
 use crate::camera::StereoRig;
 use crate::config::Config;
+use crate::image::Image;
 use crate::perception::{Region, RegionList, Rejections, TrackState};
 use crate::stamp::Stamp;
 use follow::{Box2, Follow};
@@ -19,6 +20,13 @@ const REACH: f64 = 1.5;
 const MAX_GROWTH: f32 = 2.0;
 /// A longer time between two frames in seconds is another recording.
 const LONGEST_GAP: f64 = 5.0;
+
+/// Differences in disparity within which a predicted thing and what is measured
+/// are at the same distance: in parts, and pixels.
+const SAME_PART: f32 = 0.1;
+const SAME_PX: f32 = 1.0;
+/// Share of a prediction's pixels that may speak against it.
+const MOST_AGAINST: f32 = 0.4;
 
 /// A track and a region that may be the same thing.
 #[derive(Clone, Copy, Debug)]
@@ -99,11 +107,17 @@ impl Track {
     /// confidence falls to one half over that time. A track that ends without
     /// ever having been active is counted as `unstable`.
     ///
+    /// Where `disparity` (pixels, NaN where there is none) shows through the
+    /// predicted place what lies behind it, or regions of this frame at the
+    /// same distance cover it by their pixels in `labels`, the thing is not
+    /// there (or has another identity), and nothing is published.
+    ///
     /// A stamp that goes back, or more than 5 s ahead, resets the tracker.
     pub fn run(
         &mut self,
         stamp: Stamp,
         rig: &StereoRig,
+        views: Views<'_>,
         regions: &mut RegionList,
         rejections: &mut Rejections,
     ) {
@@ -124,7 +138,7 @@ impl Track {
         for region in regions.iter_mut() {
             self.describe(stamp, region);
         }
-        self.coast(stamp, rig, regions);
+        self.coast(stamp, rig, views, regions);
     }
 
     /// Continues tracks with regions, the best pairs first.
@@ -192,7 +206,7 @@ impl Track {
     }
 
     /// Appends the active tracks that were not seen.
-    fn coast(&mut self, stamp: Stamp, rig: &StereoRig, regions: &mut RegionList) {
+    fn coast(&mut self, stamp: Stamp, rig: &StereoRig, views: Views<'_>, regions: &mut RegionList) {
         self.order.clear();
         for (i, track) in self.tracks.iter().enumerate() {
             if track.alive && !track.seen && track.active && track.is_predictable(stamp) {
@@ -213,6 +227,10 @@ impl Track {
                 regions.truncate(regions.len() - 1);
                 continue;
             }
+            if views.refute(region, rig) {
+                regions.truncate(regions.len() - 1);
+                continue;
+            }
             let missed = (track.unseen_for(stamp) / self.max_age).min(1.0) as f32;
             region.label = label;
             region.confidence = track.last.confidence * (1.0 - 0.5 * missed);
@@ -220,6 +238,40 @@ impl Track {
             region.track_state = TrackState::Coasted;
             region.track_age = track.age(stamp);
         }
+    }
+}
+
+/// What was measured where a track is predicted; both have the same size.
+#[derive(Clone, Copy)]
+pub struct Views<'a> {
+    /// Disparity in pixels, NaN where there is none.
+    pub disparity: &'a Image<f32>,
+    /// Label of the region of each pixel, else 0.
+    pub labels: &'a Image<u16>,
+}
+
+impl Views<'_> {
+    /// True when too much of the mask of a predicted region shows something
+    /// farther away, or belongs to a seen region at the same distance.
+    fn refute(&self, region: &Region, rig: &StereoRig) -> bool {
+        let expected = (rig.depth_scale() / region.position[2]) as f32;
+        let tolerance = (SAME_PART * expected).max(SAME_PX);
+        let (x, width) = (region.x as usize, region.width as usize);
+        let mut against = 0;
+        for (dy, mask) in region.mask.chunks_exact(width.max(1)).enumerate() {
+            let y = region.y as usize + dy;
+            let disparity = &self.disparity.row(y)[x..x + width];
+            let labels = &self.labels.row(y)[x..x + width];
+            for ((&d, &label), _) in
+                disparity.iter().zip(labels).zip(mask).filter(|(_, mask)| **mask != 0)
+            {
+                // NaN is neither.
+                let behind = d < expected - tolerance;
+                let taken = label != 0 && (d - expected).abs() <= tolerance;
+                against += u32::from(behind || taken);
+            }
+        }
+        against as f32 > MOST_AGAINST * region.area as f32
     }
 }
 

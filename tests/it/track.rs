@@ -2,9 +2,9 @@
 
 use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
-use salient_stereo::image::Size;
+use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::{RegionList, Rejections, TrackState};
-use salient_stereo::stage::track::Track;
+use salient_stereo::stage::track::{Track, Views};
 use salient_stereo::stamp::Stamp;
 
 const SIZE: Size = Size::new(640, 240);
@@ -63,17 +63,28 @@ struct Driver {
     track: Track,
     rig: StereoRig,
     rejections: Rejections,
+    /// What is measured; nothing at first.
+    disparity: Image<f32>,
+    labels: Image<u16>,
 }
 
 impl Driver {
     fn new(config: &Config) -> Self {
-        Self { track: Track::new(config), rig: rig(), rejections: Rejections::default() }
+        Self {
+            track: Track::new(config),
+            rig: rig(),
+            rejections: Rejections::default(),
+            disparity: Image::filled(SIZE, f32::NAN),
+            labels: Image::new(SIZE),
+        }
     }
 
     fn frame(&mut self, seconds: f64, things: &[Thing]) -> RegionList {
         let mut list = see(things);
         self.rejections = Rejections::default();
-        self.track.run(Stamp::from_seconds(seconds), &self.rig, &mut list, &mut self.rejections);
+        let views = Views { disparity: &self.disparity, labels: &self.labels };
+        let stamp = Stamp::from_seconds(seconds);
+        self.track.run(stamp, &self.rig, views, &mut list, &mut self.rejections);
         list
     }
 }
@@ -234,6 +245,8 @@ fn the_same_stamp_twice_changes_no_identity() {
 fn regions_without_depth_are_followed_by_their_boxes() {
     let mut track = Track::new(&Config::default());
     let rig = rig();
+    let (disparity, labels) = (Image::filled(SIZE, f32::NAN), Image::new(SIZE));
+    let views = Views { disparity: &disparity, labels: &labels };
     for frame in 0..5 {
         let mut list = see(&[person(-1.0 + 0.2 * f64::from(frame), 8.0), person(2.0, 8.0)]);
         for r in list.iter_mut() {
@@ -242,7 +255,7 @@ fn regions_without_depth_are_followed_by_their_boxes() {
             r.extent = [f64::NAN; 3];
         }
         let stamp = Stamp::from_seconds(f64::from(frame) * 0.1);
-        track.run(stamp, &rig, &mut list, &mut Rejections::default());
+        track.run(stamp, &rig, views, &mut list, &mut Rejections::default());
         assert_eq!(list.iter().map(|r| r.track_id).collect::<Vec<_>>(), [1, 2]);
         assert!(list[0].velocity[0].is_nan());
     }
@@ -256,5 +269,29 @@ fn switched_off_it_gives_no_ids() {
     for frame in 0..3 {
         let list = driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
         assert_eq!((list[0].track_id, list[0].track_state), (0, TrackState::None));
+    }
+}
+
+#[test]
+fn a_prediction_is_published_unless_what_is_measured_speaks_against_it() {
+    // 25 px at 8 m.
+    for (disparity, labelled, published) in [
+        (f32::NAN, false, true),
+        (60.0, true, true),
+        (25.0, false, true),
+        (12.0, false, false),
+        (25.0, true, false),
+    ] {
+        let mut driver = Driver::new(&Config::default());
+        for frame in 0..5 {
+            driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
+        }
+        driver.disparity.fill(disparity);
+        driver.labels.fill(u16::from(labelled));
+        let list = driver.frame(0.5, &[]);
+        assert_eq!(list.len(), usize::from(published), "{disparity} {labelled}");
+        // It is the same thing when it is seen again.
+        let list = driver.frame(0.6, &[person(0.0, 8.0)]);
+        assert_eq!(list[0].track_id, 1);
     }
 }
