@@ -4,13 +4,20 @@ use crate::camera::StereoRig;
 use crate::image::{Image, Size};
 use crate::stage::coarse::CELL;
 
-/// Share of the measured cells below the horizon that must lie on a plane to
-/// begin with: a street between parked cars shows a fifth.
-const ACQUIRE: f32 = 0.20;
+/// Strips into which the view is cut from left to right.
+const STRIPS: usize = 16;
+/// Cells at the lower end of each strip: where there is a ground they show it,
+/// unless a thing stands on the image's edge.
+const FOOT: usize = 6;
+/// Share of those that must lie on a plane to begin with: a street between
+/// parked cars shows a half, walls and cloths below a quarter.
+const ACQUIRE: f32 = 0.35;
 /// The same to go on with the last plane.
-const KEEP: f32 = 0.12;
-/// Cells below a plane, in parts of those on it, beyond which it is no ground.
-const MAX_BELOW: f32 = 0.5;
+const KEEP: f32 = 0.2;
+/// Least change of disparity over what is seen of a plane, in tolerances: a
+/// smaller one is no tilt but noise. A floor seen from 70 degrees above with an
+/// opening angle of 40 has 4.4.
+const LEAST_SPAN: f32 = 4.0;
 /// Part of the cells, from the bottom of the image, among which the first
 /// guesses are drawn.
 const LOWER_PART: f32 = 0.6;
@@ -18,13 +25,19 @@ const LOWER_PART: f32 = 0.6;
 const SKIP: usize = 4;
 /// Frames without support after which the last plane is given up.
 const PATIENCE: u32 = 10;
-/// Share of the new plane in the running one.
-const RENEWAL: f32 = 0.2;
+/// Share of the new plane in the running one, and the relative change of the
+/// camera's height over which it is another plane.
+const RENEWAL: f32 = 0.5;
+const MAX_STEP: f32 = 0.25;
 /// Planes tried per frame when there is none yet, and when there is one.
 const TRIALS: usize = 240;
 const TRIALS_NEAR: usize = 48;
 /// Most cells that vote.
 const MAX_VOTERS: usize = 1600;
+/// Fewest cells on a plane, and the disparity of the plane in pixels from which
+/// they count: above the horizon there is none.
+const LEAST_SEEN: usize = 20;
+const LEAST_DISPARITY: f32 = 2.0;
 /// Reweighted least-squares steps.
 const STEPS: usize = 5;
 /// Least cosine between the plane's normal and the image's vertical: a floor
@@ -106,6 +119,7 @@ struct Vote {
     u: f32,
     v: f32,
     d: f32,
+    strip: usize,
 }
 
 /// The estimator of the ground plane, with its memory of the last one.
@@ -115,7 +129,8 @@ pub struct Ground {
     state: GroundState,
     failures: u32,
     votes: Vec<Vote>,
-    depths: Vec<f32>,
+    /// Disparities of the plane where cells lie on it.
+    seen: Vec<f32>,
 }
 
 /// Largest distance of a cell from the plane it belongs to, in pixels.
@@ -148,7 +163,8 @@ impl Ground {
     /// Consensus of pairs and triples of cells (Fischler and Bolles 1981; the draws
     /// are a fixed sequence), nearest to the last plane first, then iteratively
     /// reweighted least squares. What lies below a candidate counts against
-    /// it: nothing is under the ground.
+    /// it, since nothing is under the ground, but only in its own strip of the
+    /// view: beside a road the land may fall away.
     pub fn run(&mut self, checked: &Image<f32>, rig: &StereoRig) {
         self.collect(checked, rig);
         let found = self.search(rig).and_then(|plane| self.refine(plane, rig));
@@ -158,8 +174,8 @@ impl Ground {
             (Some(new), Some(old)) => {
                 // A camera that nods moves the plane; an EMA takes the noise
                 // out, but a plane that is elsewhere is taken as it is.
-                let near = (new.camera_height_m / old.camera_height_m - 1.0).abs() < 0.25;
-                let share = if near { RENEWAL.max(0.5) } else { 1.0 };
+                let step = (new.camera_height_m / old.camera_height_m - 1.0).abs();
+                let share = if step < MAX_STEP { RENEWAL } else { 1.0 };
                 *old = mix(old, &new, share, rig);
                 (self.state, self.failures) = (GroundState::Measured, 0);
             }
@@ -177,15 +193,16 @@ impl Ground {
 
     fn collect(&mut self, checked: &Image<f32>, rig: &StereoRig) {
         self.votes.clear();
-        let (offset, cell) = (rig.disparity_offset() as f32, CELL as f32);
+        let offset = rig.disparity_offset() as f32;
         let step = (checked.size().area() / MAX_VOTERS).max(1) | 1;
         let width = checked.width();
         let mut i = 0;
         while i < checked.pixels().len() {
             let d = checked.pixels()[i] - offset;
             if d > 0.75 {
-                let (u, v) = ((i % width) as f32, (i / width) as f32);
-                self.votes.push(Vote { u: u * cell + 1.5, v: v * cell + 1.5, d });
+                let (x, y) = (i % width, i / width);
+                let (u, v) = cell_centre(x, y);
+                self.votes.push(Vote { u, v, d, strip: x * STRIPS / width });
             }
             i += step;
         }
@@ -226,9 +243,10 @@ impl Ground {
         best.1
     }
 
-    /// Votes on the plane less those below it, of every few.
+    /// Votes on the plane less those below it, of every few, summed over the
+    /// strips where that is positive.
     fn score(&self, plane: &Plane) -> f32 {
-        let mut score = 0.0;
+        let mut scores = [0.0_f32; STRIPS];
         for vote in self.votes.iter().step_by(SKIP) {
             let at = plane.disparity(vote.u, vote.v);
             let difference = vote.d - at;
@@ -236,16 +254,16 @@ impl Ground {
             // Far away everything is near the plane: such votes count less.
             let weight = (at / 8.0).clamp(0.0, 1.0);
             if difference.abs() < tolerance {
-                score += weight * (1.0 - (difference / tolerance).powi(2));
+                scores[vote.strip] += weight * (1.0 - (difference / tolerance).powi(2));
             } else if difference < 0.0 && at > 1.0 {
-                score -= 0.7 * weight;
+                scores[vote.strip] -= 0.7 * weight;
             }
         }
-        score
+        scores.iter().map(|score| score.max(0.0)).sum()
     }
 
-    /// Least squares over the votes near the plane, reweighted (Tukey), and the
-    /// share of all votes below the horizon that agree in the end.
+    /// Least squares over the votes near the plane, reweighted (Tukey), and its
+    /// support: the share of the lowest votes of all strips that lie on it.
     fn refine(&mut self, start: Plane, rig: &StereoRig) -> Option<(Plane, f32)> {
         let mut plane = start;
         for _ in 0..STEPS {
@@ -265,26 +283,31 @@ impl Ground {
             let solution = normal.try_inverse()? * right;
             plane = plane_of(solution.x as f32, solution.y as f32, solution.z as f32, rig)?;
         }
-        let (mut on, mut all, mut below) = (0.0_f32, 0.0_f32, 0.0_f32);
-        self.depths.clear();
-        for vote in &self.votes {
+        let (mut feet, mut on, mut all) = ([0_usize; STRIPS], 0.0_f32, 0.0_f32);
+        self.seen.clear();
+        // From the bottom of the image upward.
+        for vote in self.votes.iter().rev() {
             let at = plane.disparity(vote.u, vote.v);
-            if at <= 2.0 {
-                continue;
+            let agrees = at > LEAST_DISPARITY && (vote.d - at).abs() < tolerance(at);
+            if agrees {
+                self.seen.push(at);
             }
-            all += 1.0;
-            below += f32::from(u8::from(vote.d < at - tolerance(at)));
-            if (vote.d - at).abs() < tolerance(at) {
-                on += 1.0;
-                self.depths.push(rig.depth_scale() as f32 / at);
+            let foot = &mut feet[vote.strip];
+            if *foot < FOOT {
+                *foot += 1;
+                all += 1.0;
+                on += f32::from(u8::from(agrees));
             }
         }
-        if self.depths.len() < 20 || below > MAX_BELOW * on {
+        if self.seen.len() < LEAST_SEEN {
             return None;
         }
-        let middle = self.depths.len() / 2;
-        plane.distance_m = *self.depths.select_nth_unstable_by(middle, f32::total_cmp).1;
-        Some((plane, on / all))
+        let twentieth = self.seen.len() / 20;
+        let n = self.seen.len();
+        let mut ranked = |i: usize| *self.seen.select_nth_unstable_by(i, f32::total_cmp).1;
+        let (far, middle, near) = (ranked(twentieth), ranked(n / 2), ranked(n - 1 - twentieth));
+        plane.distance_m = rig.depth_scale() as f32 / middle;
+        (near - far >= LEAST_SPAN * tolerance(middle)).then_some((plane, on / all))
     }
 }
 

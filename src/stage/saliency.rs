@@ -20,6 +20,7 @@ pub mod orientation;
 pub mod paper;
 pub mod scene;
 pub mod spectral_residual;
+pub mod structure;
 mod upsample;
 
 pub use cells::shrink_view;
@@ -140,7 +141,7 @@ impl Saliency {
     /// The stage for views of `size`.
     pub fn new(config: &Config, size: Size, level: Level) -> Self {
         let mode = match config.saliency.mode {
-            SaliencyMode::Scene => Mode::Scene(Box::default()),
+            SaliencyMode::Scene => Mode::Scene(Box::new(SceneSaliency::new(level))),
             SaliencyMode::Paper => Mode::Paper(Box::new(Paper::new(&config.saliency.paper, level))),
             SaliencyMode::FrequencyTuned => {
                 Mode::FrequencyTuned(Box::new(FrequencyTuned::new(level)))
