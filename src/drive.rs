@@ -9,7 +9,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use thiserror::Error;
 
 use crate::config::Config;
-use crate::image::Size;
+use crate::image::{Image, Size};
 use crate::input::{FrameSource, Observation};
 use crate::output::AnySink;
 use crate::perception::{Clock, Perception, StereoFrame};
@@ -144,6 +144,12 @@ impl Engine {
         let running = self.running.insert(running);
         running.pipeline.process(frame, &mut running.perception);
         &running.perception
+    }
+
+    /// The gray views of the last frame, left and right, as they were matched.
+    pub fn gray_views(&self) -> Option<[&Image<u8>; 2]> {
+        let Running { pipeline, perception, .. } = self.running.as_ref()?;
+        Some([&perception.left.gray, &pipeline.right().gray])
     }
 
     /// Takes the result of the last frame out, so that it can be published

@@ -50,7 +50,7 @@ mod video;
 
 pub use continuity::continuity;
 pub use disparity::{DisparityScore, DisparityStats};
-pub use epipolar::{Epipolar, epipolar};
+pub use epipolar::{Epipolar, MISALIGNED_PX, epipolar};
 pub use fill::fill;
 pub use identity::IdSwitches;
 pub use map::{MapScore, MapStats};

@@ -101,6 +101,12 @@ impl Pipeline {
         self.preprocess.output_size()
     }
 
+    /// The right view of the last frame, rectified as the left one in
+    /// [`Perception`]; gray and gradient only.
+    pub fn right(&self) -> &View {
+        &self.right
+    }
+
     /// The ground plane of the last frame; `None` in modes that look for none.
     pub fn ground(&self) -> Option<&Ground> {
         self.saliency.ground()

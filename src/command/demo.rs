@@ -87,8 +87,8 @@ pub fn run(args: &DemoArgs) -> Result<Outcome, CommandError> {
         RosNode::open(names("demo_camera")?, &environment, false).map_err(CommandError::failed)?;
     let listener =
         RegionsListener::new(&mut camera, node.regions_topic()).map_err(CommandError::failed)?;
-    let player =
-        StereoPlayer::new(&mut camera, recording.compressed).map_err(CommandError::failed)?;
+    let player = StereoPlayer::with_infos(&mut camera, recording.compressed, recording.infos)
+        .map_err(CommandError::failed)?;
     println!(
         "playing {} ({total} pairs) into left/image_rect and right/image_rect, domain {}{}",
         path.display(),

@@ -88,6 +88,7 @@ pub fn run(args: &NodeArgs) -> Result<ExitCode, NodeCommandError> {
     }
     let names = ros.names("/", NODE_NAME)?;
     let (config, warnings) = ros.config(&Config::default(), &names)?;
+    let qos_overrides = ros.qos_overrides(&names)?;
     let environment = Environment::of_process()?;
     log::init(&ros.log, &names.logger());
     for argument in rest {
@@ -109,8 +110,11 @@ pub fn run(args: &NodeArgs) -> Result<ExitCode, NodeCommandError> {
             }
         })?;
     }
-    let options =
-        NodeOptions { rosout: ros.log.rosout, ..NodeOptions::new(config, names, environment) };
+    let options = NodeOptions {
+        qos_overrides,
+        rosout: ros.log.rosout,
+        ..NodeOptions::new(config, names, environment)
+    };
     let mut runtime = NodeRuntime::start(options)?;
     let failed = loop {
         thread::sleep(Duration::from_millis(50));

@@ -35,6 +35,9 @@ const BITS: u32 = (2 * STEPS as u32 + 1) * (2 * STEPS as u32 + 1) * WORD_BITS;
 /// Fewer points say nothing.
 const FEWEST_POINTS: usize = 12;
 
+/// Rows that are farther apart than this, in pixels, cost matches.
+pub const MISALIGNED_PX: f64 = 1.0;
+
 /// The vertical misalignment of one pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Epipolar {

@@ -10,6 +10,7 @@ use thiserror::Error;
 use crate::config::Config;
 use crate::ros::names::{NameError, Names, Remap, RemapKind};
 use crate::ros::params::{self, Assignment, ParamsError};
+use crate::ros::qos::QosOverrides;
 
 /// A ROS 2 argument that cannot be taken.
 #[derive(Debug, Error)]
@@ -208,6 +209,14 @@ impl RosArgs {
     /// With file or argument, parameter, and what is allowed.
     pub fn config(&self, base: &Config, names: &Names) -> Result<(Config, Vec<String>), ArgsError> {
         Ok(params::apply(base, &self.parameters, &names.full_name())?)
+    }
+
+    /// The `qos_overrides` for the node of these names.
+    ///
+    /// # Errors
+    /// With file or argument, and what is allowed.
+    pub fn qos_overrides(&self, names: &Names) -> Result<QosOverrides, ArgsError> {
+        Ok(QosOverrides::new(&self.parameters, &names.full_name())?)
     }
 }
 

@@ -3,19 +3,23 @@
 
 mod report;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 pub use report::{Reporter, Surroundings};
 
+use crate::metric::Epipolar;
 use crate::perception::{Rejections, StageTimes};
 use crate::sync::{Counts, Settings};
 
 /// Most drop reasons that are told apart: their texts hold numbers of untrusted
 /// messages.
 const MAX_REASONS: usize = 32;
+
+/// Measurements of the alignment that are kept: one of them may be wrong.
+const ALIGNMENTS: usize = 5;
 
 /// What the input thread knows.
 #[derive(Clone, Debug)]
@@ -51,6 +55,7 @@ pub struct NodeStatus {
     input: Mutex<Option<InputState>>,
     dropped: Mutex<BTreeMap<String, u64>>,
     calibration: Mutex<Option<Result<String, String>>>,
+    alignment: Mutex<VecDeque<Epipolar>>,
     work: Mutex<Work>,
     published: Mutex<BTreeMap<String, u64>>,
 }
@@ -115,6 +120,7 @@ impl Default for NodeStatus {
             input: Mutex::default(),
             dropped: Mutex::default(),
             calibration: Mutex::default(),
+            alignment: Mutex::default(),
             work: Mutex::default(),
             published: Mutex::default(),
         }
@@ -235,6 +241,22 @@ impl NodeStatus {
         let news = current.as_ref() != Some(&calibration);
         *current = Some(calibration);
         news
+    }
+
+    /// The rows of a pair were compared.
+    pub fn note_alignment(&self, found: Epipolar) {
+        let mut latest = lock(&self.alignment);
+        if latest.len() == ALIGNMENTS {
+            latest.pop_front();
+        }
+        latest.push_back(found);
+    }
+
+    /// The measurement with the middle error of the latest ones.
+    pub fn alignment(&self) -> Option<Epipolar> {
+        let mut latest: Vec<Epipolar> = lock(&self.alignment).iter().copied().collect();
+        latest.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
+        latest.get(latest.len() / 2).copied()
     }
 
     /// Time since the last pair, or since the start when there was none.

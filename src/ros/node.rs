@@ -1,6 +1,7 @@
 //! The node on the graph: participant, topics and services with their full
 //! names, and what discovery knows about the others.
 
+use std::collections::BTreeSet;
 use std::net::UdpSocket;
 
 use ros2_client::service::{Client, Server};
@@ -15,6 +16,7 @@ use thiserror::Error;
 use crate::ros::environment::Environment;
 use crate::ros::message::Message;
 use crate::ros::names::Names;
+use crate::ros::qos::{QosOverrides, Role};
 
 /// Receive buffer asked for each socket: two colour images of 1.4 MB arrive as
 /// one burst of fragments.
@@ -63,6 +65,8 @@ pub struct RosNode {
     names: Names,
     service_mapping: ServiceMapping,
     receive_buffer_bytes: Option<usize>,
+    qos_overrides: QosOverrides,
+    topics: BTreeSet<String>,
 }
 
 impl RosNode {
@@ -95,7 +99,19 @@ impl RosNode {
             names,
             service_mapping: environment.service_mapping,
             receive_buffer_bytes: granted_receive_buffer(),
+            qos_overrides: QosOverrides::default(),
+            topics: BTreeSet::new(),
         })
+    }
+
+    /// Replaces policies of the topics that are made from now on.
+    pub fn override_qos(&mut self, overrides: QosOverrides) {
+        self.qos_overrides = overrides;
+    }
+
+    /// Topics named by an override that this node does not have.
+    pub fn useless_qos_overrides(&self) -> BTreeSet<&str> {
+        self.qos_overrides.topics().filter(|topic| !self.topics.contains(*topic)).collect()
     }
 
     /// The node's names.
@@ -129,7 +145,7 @@ impl RosNode {
         qos: &QosPolicies,
     ) -> Result<Subscription<M>, NodeError> {
         let made = self
-            .topic::<M>(topic, qos)
+            .topic::<M>(topic, Role::Subscription, qos)
             .and_then(|topic| self.node.create_subscription(&topic, None));
         made.map_err(|e| endpoint_error("subscription", topic, &e))
     }
@@ -143,8 +159,9 @@ impl RosNode {
         topic: &str,
         qos: &QosPolicies,
     ) -> Result<Publisher<M>, NodeError> {
-        let made =
-            self.topic::<M>(topic, qos).and_then(|topic| self.node.create_publisher(&topic, None));
+        let made = self
+            .topic::<M>(topic, Role::Publisher, qos)
+            .and_then(|topic| self.node.create_publisher(&topic, None));
         made.map_err(|e| endpoint_error("publisher", topic, &e))
     }
 
@@ -190,11 +207,17 @@ impl RosNode {
             .map_err(|e| endpoint_error("client", service, &e))
     }
 
-    fn topic<M: Message>(&self, name: &str, qos: &QosPolicies) -> Result<Topic, CreateError> {
+    fn topic<M: Message>(
+        &mut self,
+        name: &str,
+        role: Role,
+        qos: &QosPolicies,
+    ) -> Result<Topic, CreateError> {
+        self.topics.insert(name.to_owned());
         Ok(self.context.domain_participant().create_topic(
             dds_topic(name),
             dds_type(M::TYPE_NAME),
-            qos,
+            &self.qos_overrides.apply(name, role, qos),
             TopicKind::NoKey,
         )?)
     }

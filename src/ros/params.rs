@@ -210,11 +210,8 @@ pub fn apply(
     let mut taken: Vec<&Assignment> = Vec::new();
     for assignment in assignments.iter().filter(|a| node_matches(&a.node, full_name)) {
         let fault = |source| ParamsError::Parameter { origin: assignment.origin.clone(), source };
-        if assignment.name.starts_with("qos_overrides.") {
-            warnings.push(format!(
-                "{}: {} is not honoured: the node's QoS is fixed",
-                assignment.origin, assignment.name
-            ));
+        // These are read when the topics are made.
+        if assignment.name.starts_with(crate::ros::qos::PREFIX) {
             continue;
         }
         match crate::config::field(&assignment.name) {

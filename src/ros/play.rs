@@ -65,7 +65,7 @@ impl StereoMessages {
 pub struct StereoPlayer {
     graph: Graph,
     images: Publishers,
-    infos: [Publisher<CameraInfo>; 2],
+    infos: [Option<Publisher<CameraInfo>>; 2],
     topics: Vec<(String, &'static str)>,
     refused: u64,
 }
@@ -82,6 +82,19 @@ impl StereoPlayer {
     /// # Errors
     /// When the graph refuses.
     pub fn new(node: &mut RosNode, compressed: bool) -> Result<Self, PlayError> {
+        Self::with_infos(node, compressed, [true; 2])
+    }
+
+    /// As [`StereoPlayer::new`], with the camera infos of these sides only: to a
+    /// node that has calibration files nobody sends them.
+    ///
+    /// # Errors
+    /// When the graph refuses.
+    pub fn with_infos(
+        node: &mut RosNode,
+        compressed: bool,
+        wanted: [bool; 2],
+    ) -> Result<Self, PlayError> {
         let mut topics = Vec::new();
         let (left, right) = ("left/image_rect", "right/image_rect");
         let images = if compressed {
@@ -92,9 +105,14 @@ impl StereoPlayer {
             let names = [node.names().topic(left)?, node.names().topic(right)?];
             Publishers::Raw(two(node, names, &mut topics)?)
         };
-        let names =
-            [node.names().topic("left/camera_info")?, node.names().topic("right/camera_info")?];
-        let infos = two(node, names, &mut topics)?;
+        let mut infos = [None, None];
+        for ((slot, side), wanted) in infos.iter_mut().zip(["left", "right"]).zip(wanted) {
+            if wanted {
+                let name = node.names().topic(&format!("{side}/camera_info"))?;
+                *slot = Some(node.advertise(&name, &qos::output())?);
+                topics.push((name, CameraInfo::TYPE_NAME));
+            }
+        }
         Ok(Self { graph: node.graph(), images, infos, topics, refused: 0 })
     }
 
@@ -117,8 +135,9 @@ impl StereoPlayer {
     /// when its images arrive.
     pub fn publish(&mut self, messages: StereoMessages) {
         let StereoMessages { images, left_info, right_info } = messages;
-        let [left, right] = &self.infos;
-        self.refused += refused(left, left_info) + refused(right, right_info);
+        for (publisher, info) in self.infos.iter().zip([left_info, right_info]) {
+            self.refused += publisher.as_ref().map_or(0, |publisher| refused(publisher, info));
+        }
         self.refused += match (&self.images, images) {
             (Publishers::Raw([l, r]), ImagePair::Raw(left, right)) => {
                 refused(l, left) + refused(r, right)

@@ -2,6 +2,10 @@
 //! needs: without them a reader keeps 64 samples of a topic and a reliable
 //! writer up to 8192 unacknowledged ones, which is gigabytes of images.
 
+mod overrides;
+
+pub use overrides::{PREFIX, QosOverrides, Role};
+
 use rustdds::policy::{Durability, History, ResourceLimits};
 use rustdds::{Duration, QosPolicies, QosPolicyBuilder};
 

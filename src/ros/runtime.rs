@@ -7,8 +7,9 @@
 //!
 //! The pipeline thread lives in a pool of its own and is never made to wait:
 //! what the output thread cannot take is replaced by the next result. A fourth
-//! thread answers the services.
+//! thread answers the services, a fifth measures the alignment of the cameras.
 
+mod align;
 mod work;
 
 use std::sync::atomic::AtomicU64;
@@ -33,6 +34,7 @@ use crate::ros::log;
 use crate::ros::names::Names;
 use crate::ros::node::{Graph, NodeError, RosNode, receive_buffer_advice};
 use crate::ros::params::ParameterStore;
+use crate::ros::qos::QosOverrides;
 use crate::ros::services::{Services, Targets};
 use crate::ros::time::NodeClock;
 use crate::stamp::Stamp;
@@ -73,6 +75,8 @@ pub struct NodeOptions {
     pub names: Names,
     /// Domain and networks.
     pub environment: Environment,
+    /// What replaces the node's own quality of service.
+    pub qos_overrides: QosOverrides,
     /// Log to `/rosout`.
     pub rosout: bool,
     /// Sees each result, in the output thread.
@@ -85,7 +89,15 @@ pub struct NodeOptions {
 impl NodeOptions {
     /// Options without observer.
     pub fn new(config: Config, names: Names, environment: Environment) -> Self {
-        Self { config, names, environment, rosout: true, observer: None, results_waiting: 2 }
+        Self {
+            config,
+            names,
+            environment,
+            qos_overrides: QosOverrides::default(),
+            rosout: true,
+            observer: None,
+            results_waiting: 2,
+        }
     }
 }
 
@@ -109,12 +121,21 @@ impl NodeRuntime {
     /// # Errors
     /// When sockets, topics or threads are refused; nothing runs then.
     pub fn start(options: NodeOptions) -> Result<Self, RuntimeError> {
-        let NodeOptions { config, names, environment, rosout, observer, results_waiting } = options;
+        let NodeOptions {
+            config,
+            names,
+            environment,
+            qos_overrides,
+            rosout,
+            observer,
+            results_waiting,
+        } = options;
         for note in &environment.notes {
             tracing::warn!("{note}");
         }
         log::mute_transport(false);
         let mut node = RosNode::open(names.clone(), &environment, rosout)?;
+        node.override_qos(qos_overrides);
         let clock = Arc::new(NodeClock::default());
         clock.simulate(config.use_sim_time);
         if rosout {
@@ -127,6 +148,9 @@ impl NodeRuntime {
         let pool = worker_pool(config.threads)?;
         let input = LiveInput::subscribe(&mut node, &config)?;
         let output = LiveOutput::advertise(&mut node, Arc::clone(&status))?;
+        for topic in node.useless_qos_overrides() {
+            tracing::warn!("qos_overrides for {topic} change nothing: the node has no such topic");
+        }
         let regions_topic = output.regions_topic().to_owned();
         let graph = node.graph();
         let receive_buffer_bytes = node.receive_buffer_bytes();
@@ -174,6 +198,11 @@ impl NodeRuntime {
                 input.run(&store, &pairs, &status, input_stopped);
             })?;
         }
+        let grays = Arc::new(Mailbox::new(1));
+        {
+            let (status, grays) = (Arc::clone(&status), Arc::clone(&grays));
+            runtime.spawn("alignment", &ending, move || align::run(&grays, &status))?;
+        }
         let worker = work::Worker {
             store: Arc::clone(&store),
             status: Arc::clone(&status),
@@ -181,8 +210,9 @@ impl NodeRuntime {
             pairs,
             results: Arc::clone(&results),
             spares: Arc::clone(&spares),
+            grays: align::Sampler::new(grays),
         };
-        runtime.spawn("pipeline", &ending, move || pool.install(|| worker.run()))?;
+        runtime.spawn("pipeline", &ending, move || pool.install(move || worker.run()))?;
         let publisher = work::OutputThread {
             output,
             observer,

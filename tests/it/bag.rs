@@ -3,6 +3,7 @@
 
 mod broken;
 mod choice;
+mod demo;
 pub mod recipe;
 mod sink;
 

@@ -46,3 +46,21 @@ fn every_overlay_loads_and_holds_only_what_differs() {
         }
     }
 }
+
+/// `ros2 param dump` names the node in full, so that every parameter must be known.
+#[test]
+fn a_dump_of_a_running_node_loads_back() {
+    let config = Config::default()
+        .with_all([
+            ("saliency.threshold", serde_json::json!(0.25)),
+            ("depth.encoding", serde_json::json!("16UC1")),
+            ("camera_info.left_url", serde_json::json!("file:///a b/left.yaml")),
+        ])
+        .unwrap();
+    let dump = params::to_yaml(&config).replace("/**:", "/robot/eye:");
+    let all = params::parse(&dump, "dump.yaml").unwrap();
+    assert!(all.iter().all(|assignment| assignment.strict));
+    let (loaded, warnings) = apply(&Config::default(), &all, "/robot/eye").unwrap();
+    assert_eq!(loaded, config);
+    assert!(warnings.is_empty(), "{warnings:?}");
+}

@@ -7,9 +7,10 @@ use mcap::MessageStream;
 
 use crate::command::CommandError;
 use crate::command::replay::RunTotals;
+use crate::command::settings::bag_options;
 use crate::command::summary;
 use crate::config::Config;
-use crate::input::bag::{BagOptions, BagSource};
+use crate::input::bag::{BagSource, BagTopics};
 use crate::input::{FrameSource, Observation, Truth};
 use crate::output::Sink;
 use crate::output::bag::{BagSink, BagTopicsOut};
@@ -30,6 +31,8 @@ pub struct Recording {
     pub messages: Vec<StereoMessages>,
     /// True when the images are `CompressedImage`s.
     pub compressed: bool,
+    /// Whether the left and the right camera info are played.
+    pub infos: [bool; 2],
     /// What is true at each stamp.
     pub truth: BTreeMap<Stamp, Truth>,
 }
@@ -48,26 +51,28 @@ impl Recording {
             )));
         }
         // The source checks every pair, so that only usable ones are played.
-        let mut source =
-            BagSource::open(path, config, BagOptions::default()).map_err(CommandError::failed)?;
+        let options = bag_options(config, BagTopics::default())?;
+        let fixed = options.camera_infos.each_ref().map(Option::is_some);
+        let mut source = BagSource::open(path, config, options).map_err(CommandError::failed)?;
         let mut truth = BTreeMap::new();
         while let Some(observation) = source.next_observation().map_err(CommandError::failed)? {
             truth.insert(observation.frame.stamp, observation.truth.unwrap_or_default());
         }
         let selection = source.selection();
-        let (Some(right), [Some(left_info), Some(right_info)]) =
-            (&selection.right, &selection.infos)
-        else {
-            return Err(failed("has no two image topics with their camera infos".into()));
+        let Some(right) = &selection.right else {
+            return Err(failed("has no two image topics".into()));
         };
         let compressed = selection.left.compressed;
-        let names = [&selection.left.name, &right.name, left_info, right_info];
+        // The node takes from a file what is fixed; the bag's own is not played.
+        let [left_info, right_info] =
+            [0, 1].map(|i| selection.infos[i].as_ref().filter(|_| !fixed[i]));
+        let names = [Some(&selection.left.name), Some(&right.name), left_info, right_info];
         let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
         let messages = messages(&bytes, names, compressed, &truth).map_err(failed)?;
         if messages.is_empty() {
             return Err(failed("has no stereo pair with equal stamps".into()));
         }
-        Ok(Self { messages, compressed, truth })
+        Ok(Self { messages, compressed, infos: fixed.map(|fixed| !fixed), truth })
     }
 }
 
@@ -84,14 +89,16 @@ enum Sent {
 
 fn messages(
     bytes: &[u8],
-    names: [&String; 4],
+    names: [Option<&String>; 4],
     compressed: bool,
     usable: &BTreeMap<Stamp, Truth>,
 ) -> Result<Vec<StereoMessages>, String> {
     let mut by_stamp = BTreeMap::<Stamp, Partial>::new();
     for message in MessageStream::new(bytes).map_err(|e| e.to_string())? {
         let message = message.map_err(|e| e.to_string())?;
-        let Some(slot) = names.iter().position(|name| **name == message.channel.topic) else {
+        let Some(slot) =
+            names.iter().position(|name| name.is_some_and(|name| *name == message.channel.topic))
+        else {
             continue;
         };
         let text = |e: cdr::CdrError| format!("{}: {e}", message.channel.topic);
@@ -120,7 +127,14 @@ fn messages(
                 }
                 _ => return None,
             };
-            Some(StereoMessages { images, left_info: left_info?, right_info: right_info? })
+            let info = |info: Option<CameraInfo>, wanted: bool| {
+                if wanted { info } else { Some(CameraInfo::default()) }
+            };
+            Some(StereoMessages {
+                images,
+                left_info: info(left_info, names[2].is_some())?,
+                right_info: info(right_info, names[3].is_some())?,
+            })
         })
         .collect())
 }

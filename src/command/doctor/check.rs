@@ -3,7 +3,7 @@
 use super::finding::Finding;
 use crate::config::Config;
 use crate::image::Size;
-use crate::metric::{Epipolar, epipolar};
+use crate::metric::{Epipolar, MISALIGNED_PX, epipolar};
 use crate::perception::{Perception, StereoFrame, View};
 use crate::simd;
 use crate::stage::preprocess::Preprocess;
@@ -16,9 +16,7 @@ const REACH: usize = 24;
 const MOST_MEASURED: usize = 8;
 const STRIDE: usize = 5;
 
-/// Median vertical offset from which stereo suffers, and from which the images
-/// cannot be rectified, pixels.
-pub const MISALIGNED_PX: f64 = 1.0;
+/// Median vertical offset from which the images cannot be rectified, pixels.
 const UNRECTIFIED_PX: f64 = 3.0;
 
 /// Longest baseline that a rig is believed to have, metres.

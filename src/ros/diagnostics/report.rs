@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use super::{NodeStatus, Totals, Work, lock};
 use crate::config::Config;
+use crate::metric::{Epipolar, MISALIGNED_PX};
 use crate::perception::Stage;
 use crate::ros::message::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::ros::message::std_msgs::Header;
@@ -192,6 +193,9 @@ impl Reporter {
             Some(Ok(text)) => calibration.value("rig", text),
             Some(Err(text)) => calibration.say_again(DiagnosticStatus::ERROR, text),
         }
+        if let Some(found) = status.alignment() {
+            alignment(&found, config.rectify, &mut calibration);
+        }
 
         // Processing.
         let work = std::mem::take(&mut *lock(&status.work));
@@ -263,6 +267,22 @@ impl Reporter {
             });
         }
         message
+    }
+}
+
+fn alignment(found: &Epipolar, rectify: bool, draft: &mut Draft) {
+    draft.value("vertical offset of matched points (px)", format_args!("{:.2}", found.offset_px));
+    draft.value("epipolar error (px)", format_args!("{:.2}", found.error_px));
+    draft.value("points matched for it", found.points);
+    if found.error_px > MISALIGNED_PX {
+        let fix = if rectify { "" } else { ", or set rectify for raw images" };
+        draft.say(
+            DiagnosticStatus::WARN,
+            format_args!(
+                "rows of the two images are {:.1} px apart (median of {} points): calibrate the cameras anew{fix}",
+                found.error_px, found.points
+            ),
+        );
     }
 }
 
@@ -354,6 +374,30 @@ mod tests {
         let input = status(&message, "Input");
         assert_eq!(input.level, DiagnosticStatus::WARN);
         assert!(input.values.iter().any(|v| v.key == "dropped: reason 1" && v.value == "2"));
+    }
+
+    #[test]
+    fn rows_that_are_apart_are_a_warning_unless_it_was_one_bad_measurement() {
+        let found =
+            |error_px| Epipolar { offset_px: error_px, error_px, disparity_px: 9.0, points: 30 };
+        let node_status = NodeStatus::default();
+        let mut reporter = Reporter::new("n");
+        let mut level = || {
+            let around = Surroundings::default();
+            let message = reporter.report(Stamp(1), &node_status, &Config::default(), &around);
+            let calibration = status(&message, "Calibration");
+            (calibration.level, calibration.message.clone())
+        };
+        for error in [0.2, 0.3, 5.0] {
+            node_status.note_alignment(found(error));
+        }
+        assert_eq!(level().0, DiagnosticStatus::OK);
+        for _ in 0..5 {
+            node_status.note_alignment(found(1.4));
+        }
+        let (level, message) = level();
+        assert_eq!(level, DiagnosticStatus::WARN);
+        assert!(message.contains("1.4 px apart (median of 30 points)"), "{message}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::Observer;
+use super::align::Sampler;
 use crate::drive::Engine;
 use crate::input::Observation;
 use crate::input::live::{FrameBuilder, FrameError, LivePair, Topic};
@@ -34,11 +35,12 @@ pub(super) struct Worker {
     pub pairs: Arc<Mailbox<LivePair>>,
     pub results: Arc<Mailbox<Outcome>>,
     pub spares: Spares,
+    pub grays: Sampler,
 }
 
 impl Worker {
     /// Until no pair will come any more.
-    pub fn run(&self) {
+    pub fn run(mut self) {
         let mut config = self.store.config();
         let mut generation = self.store.generation();
         let mut resets = self.resets.load(Ordering::Acquire);
@@ -89,6 +91,7 @@ impl Worker {
                 engine = Engine::new((*config).clone());
                 continue;
             }
+            self.grays.take(&engine, &config);
             let spare = self.spares.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let Some(perception) = engine.exchange(spare) else { continue };
             let observation = Observation { frame, truth: None };
