@@ -180,7 +180,7 @@ pub const FIELDS: &[Field] = &[
     live(
         "stereo.uniqueness_ratio",
         Integer(0, 100),
-        "Percentage by which the best cost must beat the second best.",
+        "Percentage by which the best cost must beat the second best, in the mean over the 9x9 pixels around.",
     ),
     live(
         "stereo.disp12_max_diff",

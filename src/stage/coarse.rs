@@ -61,7 +61,6 @@ impl Coarse {
             },
             method: Method::FourPaths,
             context: 4,
-            uniqueness_ratio: 0,
             search: lo / CELL..hi.div_ceil(CELL) + 1,
         };
         Self {

@@ -65,14 +65,15 @@ impl Refine {
                 .then_some(stereo.disp12_max_diff as i32 * STEPS + STEPS / 2),
             speckle_size: stereo.speckle_size.max(0) as usize,
             speckle_range: (stereo.speckle_range * f64::from(STEPS)) as i32,
-            min_confidence: config.min_confidence as f32,
+            // None has a confidence of 0.
+            min_confidence: (config.min_confidence as f32).max(f32::MIN_POSITIVE),
             fill: stereo.fill == Fill::Roi && config.min_confidence <= f64::from(FILLED),
             checked: Image::default(),
             evidence: Image::default(),
             smooth: Image::default(),
             outside: Vec::new(),
             speckles: Speckles::default(),
-            trust: Trust::default(),
+            trust: Trust::new(stereo.uniqueness_ratio),
         }
     }
 
@@ -216,8 +217,7 @@ fn median<S: Simd>(
     );
 }
 
-/// Drops disparities that are not unique or that the right view contradicts,
-/// and their evidence.
+/// Drops disparities that the right view contradicts, and their evidence.
 #[inline(always)]
 fn check_row(
     matches: &Matches,

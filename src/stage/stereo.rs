@@ -65,7 +65,6 @@ impl Stereo {
                 Algorithm::CensusBlock => Method::Block(Measure::Census),
             },
             context: 8,
-            uniqueness_ratio: stereo.uniqueness_ratio.max(0) as u32,
             search: lo..lo + stereo.disparity_range.max(1) as usize,
         };
         Self {

@@ -47,13 +47,7 @@ fn coarse_of(size: Size, seed: u64) -> Image<f32> {
 }
 
 fn settings(method: Method, search: Range<usize>) -> Settings {
-    Settings {
-        penalties: Penalties { p1: 7, p2: 40 },
-        method,
-        context: 3,
-        uniqueness_ratio: 5,
-        search,
-    }
+    Settings { penalties: Penalties { p1: 7, p2: 40 }, method, context: 3, search }
 }
 
 fn assert_same(found: &Matches, expected: &Matches, what: &str) {
@@ -187,6 +181,7 @@ proptest! {
         seed: u64,
         speckle_size in 0_i64..40,
         max_difference in -1_i64..3,
+        uniqueness_ratio in 0_i64..60,
         fill: bool,
     ) {
         let size = Size::new(width, height);
@@ -205,6 +200,7 @@ proptest! {
         let mut config = Config::default();
         config.stereo.speckle_size = speckle_size;
         config.stereo.disp12_max_diff = max_difference;
+        config.stereo.uniqueness_ratio = uniqueness_ratio;
         if fill {
             config.stereo.fill = Fill::Roi;
         } else {

@@ -13,24 +13,30 @@ const BLOCK: usize = 64;
 const SPAN: usize = BLOCK + 2 * RADIUS;
 
 /// Share of wrong disparities where there is no evidence at all.
-const WORST: f32 = 1.0 / 3.0;
+const WORST: f32 = 0.48;
 /// How fast it falls with the mean peak ratio.
-const FALL: f32 = 1.0 / 33.0;
+const FALL: f32 = 1.0 / 42.0;
 
 /// The confidence that follows from the window's mean evidence.
 pub struct Trust {
-    /// By mean evidence: `1 - exp(-e / 33) / 3`, the share of disparities with an
-    /// error of at most max(3 px, 5 %), as found on road and on indoor scenes alike.
+    /// By mean evidence: `1 - 0.48 exp(-e / 42)`, the share of disparities with an
+    /// error of at most max(3 px, 5 %), as found on road and on indoor scenes
+    /// alike; 0 where it is not enough.
     table: [f32; 256],
 }
 
-impl Default for Trust {
-    fn default() -> Self {
-        Self { table: std::array::from_fn(|e| 1.0 - WORST * (-(e as f32) * FALL).exp()) }
-    }
-}
-
 impl Trust {
+    /// Confidence of disparities whose best cost beats the second best by
+    /// `uniqueness_ratio` percent in the window's mean, and none of others.
+    pub fn new(uniqueness_ratio: i64) -> Self {
+        // Evidence is 255 (second - best) / second.
+        let ratio = uniqueness_ratio.clamp(0, 10_000) as f32;
+        let least = 255.0 * ratio / (100.0 + ratio);
+        let confidence = |e: usize| 1.0 - WORST * (-(e as f32) * FALL).exp();
+        let table = std::array::from_fn(|e| if e as f32 >= least { confidence(e) } else { 0.0 });
+        Self { table }
+    }
+
     /// Writes the confidence of the pixels of row `y` in `area`, from the mean of
     /// `evidence` over 9x9 pixels; nothing outside the area counts. A single cost
     /// curve says little: that its neighbours are as clear, and none was

@@ -25,8 +25,6 @@ pub struct Settings {
     pub method: Method,
     /// Rows above and below a band that its paths come from.
     pub context: usize,
-    /// Percentage by which the best cost must beat the second best.
-    pub uniqueness_ratio: u32,
     /// Disparities searched.
     pub search: Range<usize>,
 }
@@ -233,7 +231,6 @@ impl Scratch {
             shape: &shape,
             x0: run.x0,
             y0: band.y0,
-            uniqueness_ratio: settings.uniqueness_ratio,
             right: &mut self.right_winner,
             left: &mut *rows.left,
             evidence: &mut *rows.evidence,
@@ -284,7 +281,6 @@ pub struct Finish<'a> {
     shape: &'a RunShape<'a>,
     x0: usize,
     y0: usize,
-    uniqueness_ratio: u32,
     right: &'a mut RightWinner,
     left: &'a mut [i16],
     evidence: &'a mut [u8],
@@ -312,7 +308,7 @@ impl Finish<'_> {
         let inside = (width - x).min(LANES);
         let lo = self.shape.tiles[k].lo;
         self.right.take(simd, k, lo, inside, costs);
-        let found = winners(simd, costs, lo, floors, self.uniqueness_ratio);
+        let found = winners(simd, costs, lo, floors);
         let at = y * width + x;
         let left = &mut self.left[at..at + inside];
         let evidence = &mut self.evidence[at..at + inside];

@@ -165,13 +165,7 @@ const fn shift_for(range: usize) -> u32 {
 /// Winners of 32 pixels from their summed costs, a block per disparity from
 /// `lo` on. `floors` is what was subtracted from all costs of a pixel.
 #[inline(always)]
-pub fn winners<S: Simd>(
-    simd: S,
-    costs: &[Block],
-    lo: usize,
-    floors: &[u16; LANES],
-    uniqueness_ratio: u32,
-) -> Winners {
+pub fn winners<S: Simd>(simd: S, costs: &[Block], lo: usize, floors: &[u16; LANES]) -> Winners {
     let n = costs.len();
     let shift = shift_for(n);
     // The costs beside the best one are kept along with it. At an end of the
@@ -226,8 +220,7 @@ pub fn winners<S: Simd>(
         // Exact where it matters: both are whole numbers below 2000, so that a
         // quotient that is no whole number is no neighbour of one either.
         let evidence = (255.0 * (other - first) / other.max(1.0)).clamp(1.0, 255.0) as u8;
-        let unique = other * 100.0 >= first * (100 + uniqueness_ratio) as f32;
-        out.evidence[lane] = if unique && best[lane] != 255 { evidence } else { 0 };
+        out.evidence[lane] = if best[lane] == 255 { 0 } else { evidence };
     }
     out
 }

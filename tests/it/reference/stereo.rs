@@ -273,8 +273,7 @@ pub fn matches(views: &Views<'_>, plan: &Plan, settings: &Settings) -> Matches {
                     let (costs, floors) = &sums[&p];
                     let range = domain.range(p.0);
                     if views.mask.is_none_or(|mask| mask.get(x, y) != 0)
-                        && let Some((d, evidence)) =
-                            winner(costs, &range, u32::from(*floors), settings.uniqueness_ratio)
+                        && let Some((d, evidence)) = winner(costs, &range, u32::from(*floors))
                     {
                         out.left.set(x, y, d);
                         out.evidence.set(x, y, evidence);
@@ -315,7 +314,6 @@ fn winner(
     costs: &HashMap<usize, u8>,
     range: &std::ops::Range<usize>,
     floors: u32,
-    uniqueness_ratio: u32,
 ) -> Option<(i16, u8)> {
     let best = range.clone().min_by_key(|d| costs[d])?;
     let c0 = costs[&best];
@@ -325,11 +323,7 @@ fn winner(
     let second =
         range.clone().filter(|d| d.abs_diff(best) > 1).map(|d| costs[&d]).min().unwrap_or(255);
     let (first, second) = (u32::from(c0) + floors, u32::from(second) + floors);
-    let evidence = if 100 * second < (100 + uniqueness_ratio) * first {
-        0
-    } else {
-        (255 * (second - first) / second.max(1)).clamp(1, 255) as u8
-    };
+    let evidence = (255 * (second - first) / second.max(1)).clamp(1, 255) as u8;
     let cost =
         |d: Option<usize>| d.and_then(|d| costs.get(&d)).copied().map_or(f64::from(c0), f64::from);
     // Beyond an end of the range nothing is known: no offset there.
@@ -397,11 +391,19 @@ pub fn refined(
                 }
             }
         }
-        1.0 - 1.0 / 3.0 * (-((sum / 81) as f32) * (1.0 / 33.0)).exp()
+        let mean = (sum / 81) as f32;
+        let ratio = config.stereo.uniqueness_ratio as f32;
+        if mean < 255.0 * ratio / (100.0 + ratio) {
+            return 0.0;
+        }
+        1.0 - 0.48 * (-mean * (1.0 / 42.0)).exp()
     };
     let valid = |x: usize, y: usize| {
         let d = smooth.get(x, y);
-        d != NO_MATCH && patches.get(x, y) >= least && trust(x, y) >= config.min_confidence as f32
+        d != NO_MATCH
+            && patches.get(x, y) >= least
+            && trust(x, y) > 0.0
+            && trust(x, y) >= config.min_confidence as f32
     };
     let measured = |x, y| f32::from(smooth.get(x, y)) / 32.0;
     let mut disparity = Image::filled(size, f32::NAN);
