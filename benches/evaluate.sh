@@ -44,6 +44,9 @@ if [ -n "${PYTHON:-}" ]; then
     mkdir -p out
     "$PYTHON" benches/peers/stereo.py "${scenes[@]}" --tool "$tool" --readme README.md --json out/peers.json >out/peers.md
     peers=(--peers out/peers.json)
+    if [ -d "$data/kitti2012/training/disp_noc" ]; then
+        "$PYTHON" benches/saliency_weight.py "$tool" "$data/kitti2012" --readme README.md >/dev/null
+    fi
 fi
 
 "$tool" evaluate "${kinds[@]}" "${paths[@]}" "${peers[@]}" "$@" \

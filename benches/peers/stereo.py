@@ -31,6 +31,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from readme import splice
+
 STEP = 16.0
 
 
@@ -279,16 +282,6 @@ def summary(rows, args):
     return "\n".join(lines) + "\n"
 
 
-def splice(path, text):
-    """Puts `text` between the lines `<!-- matcher: begin … -->` and `<!-- matcher: end -->` of a file."""
-    lines = Path(path).read_text().splitlines(keepends=True)
-    marks = [[i for i, line in enumerate(lines) if line.startswith(f"<!-- matcher: {mark}")] for mark in ("begin", "end")]
-    if [len(mark) for mark in marks] != [1, 1] or marks[0][0] > marks[1][0]:
-        sys.exit(f"{path}: one line `<!-- matcher: begin -->` and one `<!-- matcher: end -->` after it expected")
-    (begin,), (end,) = marks
-    Path(path).write_text("".join([*lines[:begin + 1], "\n", text, "\n", *lines[end:]]))
-
-
 def measure(scene, args, peers, rows):
     """Prints the tables of one scene, adds the rows of the others to `peers` and the summary to `rows`."""
     left, right = gray(scene.left), gray(scene.right)
@@ -403,7 +396,7 @@ def main():
         text = summary(rows, args)
         print(text)
         if args.readme:
-            splice(args.readme, text)
+            splice(args.readme, "matcher", text)
     if args.json:
         Path(args.json).write_text(json.dumps({"peers": peers}, indent=1))
 
