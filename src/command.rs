@@ -5,6 +5,7 @@ pub mod demo;
 pub mod doctor;
 pub mod evaluate;
 pub mod export_bag;
+pub mod install_ament;
 pub mod node;
 pub mod render;
 pub mod replay;
@@ -44,6 +45,8 @@ enum Command {
     Doctor(doctor::DoctorArgs),
     /// Write a scene of a data set, or a pair of images, as a ROS 2 bag.
     ExportBag(export_bag::ExportBagArgs),
+    /// Write an ament overlay, so that `ros2 run` and `ros2 launch` find the node.
+    InstallAment(install_ament::InstallAmentArgs),
     /// Measure milliseconds per stage.
     Bench(bench::BenchArgs),
     /// Measure methods on data with truth, and make the tables.
@@ -91,6 +94,7 @@ pub fn run(cli: Cli) -> ExitCode {
         Command::Replay(args) => replay::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::ExportBag(args) => export_bag::run(&args),
+        Command::InstallAment(args) => install_ament::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Render(args) => render::run(&args).map(|()| Outcome::Done).map_err(|e| {

@@ -16,6 +16,8 @@ mod it {
     #[cfg(feature = "tool")]
     mod faulty;
     #[cfg(feature = "tool")]
+    mod install;
+    #[cfg(feature = "tool")]
     mod interop;
     #[cfg(feature = "tool")]
     mod live;

@@ -212,9 +212,14 @@ fn environment() -> Result<Environment, CommandError> {
 /// The street bag: beside the working directory, the installed tool, or in the
 /// source tree that the tool was built from.
 fn shipped_bag() -> Result<PathBuf, CommandError> {
-    let installed = std::env::current_exe()
-        .ok()
-        .and_then(|exe| Some(exe.parent()?.parent()?.join("share/salient_stereo")));
+    // PREFIX/bin/tool, or PREFIX/lib/PACKAGE/tool as ament lays it out.
+    let exe = std::env::current_exe().unwrap_or_default();
+    let installed = exe
+        .ancestors()
+        .skip(2)
+        .take(2)
+        .map(|prefix| prefix.join("share/salient_stereo"))
+        .find(|share| share.is_dir());
     let roots = [Some(PathBuf::from(".")), installed, Some(env!("CARGO_MANIFEST_DIR").into())];
     roots
         .into_iter()
