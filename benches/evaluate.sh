@@ -35,13 +35,15 @@ add bag bags/street.mcap
 add bag bags/tabletop.mcap
 
 peers=()
+scenes=()
 if [ -n "${PYTHON:-}" ]; then
-    scenes=()
     [ -d "$data/kitti2012/training/disp_noc" ] && scenes+=("$data/kitti2012")
     [ -d "$data/kitti2015/training/disp_noc_0" ] && scenes+=("$data/kitti2015")
     while read -r image; do scenes+=("$(dirname "$image")"); done < <(
-        find -L "$data"/middlebury* -name mask0nocc.png -o -name groundtruth.png -o -name disp1.png -o -name '*GT.png' | sort)
+        find -L "$data"/middlebury*/ -name mask0nocc.png -o -name groundtruth.png -o -name disp1.png -o -name '*GT.png' | sort)
     mkdir -p out
+fi
+if [ ${#scenes[@]} -gt 0 ]; then
     "$PYTHON" benches/peers/stereo.py "${scenes[@]}" --tool "$tool" --readme README.md --json out/peers.json >out/peers.md
     peers=(--peers out/peers.json)
     if [ -d "$data/kitti2012/training/disp_noc" ]; then

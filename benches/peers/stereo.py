@@ -93,8 +93,9 @@ class Scene:
             self.left, self.right = folder / "im0.png", folder / "im1.png"
             truth = next(p for p in (folder / "disp0GT.pfm", folder / "disp0.pfm") if p.exists())
             self.occ = read_pfm(truth)
-            visible = gray(folder / "mask0nocc.png")
-            self.noc = self.occ * (visible == 255)
+            # Only the evaluation of 2014 (version 3) tells what both views see.
+            mask = folder / "mask0nocc.png"
+            self.noc = self.occ * (gray(mask) == 255) if mask.exists() else self.occ
         elif (folder / "imL.png").exists():
             # Version 2 of the Middlebury evaluation: the scale of the map stands in info.txt.
             self.left, self.right = folder / "imL.png", folder / "imR.png"
@@ -235,8 +236,7 @@ def replay(tool, scene, disparities, work):
     bag, out = work / "in.mcap", work / "out.mcap"
     if scene.kitti:
         folder, name, _ = scene.kitti
-        kind = "kitti2012" if (Path(folder) / "training" / "image_0").is_dir() else "kitti2015"
-        source = ["--dataset", kind, "--scene", name, folder]
+        source = ["--dataset", scene.dataset, "--scene", name, folder]
     else:
         # Depth plays no part here: any focal length and baseline will do.
         source = ["--left", scene.left, "--right", scene.right, "--focal", 1000, "--baseline", 0.1, "--offset", 0]

@@ -163,7 +163,7 @@ pub const FIELDS: &[Field] = &[
     live(
         "stereo.paths",
         OneOf(&[4, 5, 8]),
-        "Paths of the semi-global matcher: 8 is the most accurate; 5 leaves out those from below and takes about a quarter less time, 4 the diagonals.",
+        "Paths of the semi-global matcher: 8 are the most accurate; 5 leave out those from below, 4 the diagonals: faster, and less accurate where holes are filled.",
     ),
     live("stereo.min_disparity", Integer(0, 511), "Smallest disparity searched, in pixels."),
     live("stereo.disparity_range", Integer(16, 512), "Number of disparities searched, in pixels."),
@@ -180,7 +180,7 @@ pub const FIELDS: &[Field] = &[
     live(
         "stereo.uniqueness_ratio",
         Integer(0, 100),
-        "Percentage by which the best cost must beat the second best, in the mean over the 9x9 pixels around.",
+        "Percentage by which the best cost must beat the second best, in the mean over the matched ones of the 9x9 pixels around.",
     ),
     live(
         "stereo.disp12_max_diff",

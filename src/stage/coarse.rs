@@ -55,10 +55,7 @@ impl Coarse {
         let lo = stereo.min_disparity.max(0) as usize;
         let hi = lo + stereo.disparity_range.max(1) as usize;
         let settings = Settings {
-            penalties: Penalties {
-                p1: stereo.p1.clamp(0, 100) as u8,
-                p2: stereo.p2.clamp(stereo.p1, 100) as u8,
-            },
+            penalties: Penalties::of(stereo),
             method: Method::FourPaths,
             context: 4,
             search: lo / CELL..hi.div_ceil(CELL) + 1,

@@ -61,8 +61,11 @@ impl Refine {
         Self {
             level,
             size,
-            max_difference: (stereo.disp12_max_diff >= 0)
-                .then_some(stereo.disp12_max_diff as i32 * STEPS + STEPS / 2),
+            // Right disparities of wide ranges are known to two pixels only.
+            max_difference: (stereo.disp12_max_diff >= 0).then_some(
+                stereo.disp12_max_diff as i32 * STEPS
+                    + if stereo.disparity_range > 256 { STEPS } else { STEPS / 2 },
+            ),
             speckle_size: stereo.speckle_size.max(0) as usize,
             speckle_range: (stereo.speckle_range * f64::from(STEPS)) as i32,
             // None has a confidence of 0.
@@ -106,39 +109,46 @@ impl Refine {
             },
         );
         self.outside.resize(self.size.width, NO_MATCH);
-        let (checked, outside) = (&self.checked, &self.outside[..]);
-        let smooth = self.smooth.pixels_mut()[within].par_chunks_exact_mut(width);
-        smooth.enumerate().with_min_len(ROWS_AT_ONCE).for_each(|(i, smooth)| {
-            dispatch!(level, simd => median(simd, checked, outside, &area, first + i, smooth));
+        let (checked, evidence) = (&self.checked, &self.evidence);
+        let (outside, trust, least) = (&self.outside[..], &self.trust, self.min_confidence);
+        let (smooth, columns) = (&mut self.smooth, &area.columns);
+        let rows = smooth.pixels_mut().par_chunks_exact_mut(width);
+        let rows = rows.zip(confidence.pixels_mut().par_chunks_exact_mut(width)).enumerate();
+        rows.with_min_len(ROWS_AT_ONCE).for_each(|(y, (smooth, confidence))| {
+            if !area.rows.contains(&y) {
+                confidence.fill(0.0);
+                return;
+            }
+            confidence[..columns.start].fill(0.0);
+            confidence[columns.end..].fill(0.0);
+            let (smooth, confidence) =
+                (&mut smooth[columns.clone()], &mut confidence[columns.clone()]);
+            dispatch!(level, simd => {
+                median(simd, checked, outside, &area, y, smooth);
+                trust.row(simd, evidence, &roi.matched, &area, y, confidence);
+                distrust(smooth, confidence, least);
+            });
         });
         self.speckles.find(level, &self.smooth, &area, self.speckle_size, self.speckle_range);
-        let (evidence, speckles, trust) = (&self.evidence, &self.speckles, &self.trust);
-        let offset = rig.disparity_offset() as f32;
-        let (least, fills) = (self.min_confidence, self.fill);
+        let (speckles, offset, fills) = (&self.speckles, rig.disparity_offset() as f32, self.fill);
         let smooth = self.smooth.pixels_mut().par_chunks_exact_mut(width);
         let disparity = disparity.pixels_mut().par_chunks_exact_mut(width);
         let confidence = confidence.pixels_mut().par_chunks_exact_mut(width);
         smooth.zip(disparity).zip(confidence).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
             |(y, ((smooth, disparity), confidence))| {
-                let columns = if area.rows.contains(&y) { area.columns.clone() } else { 0..0 };
-                let (before, after) = (..columns.start, columns.end..);
-                disparity[before].fill(f32::NAN);
-                confidence[before].fill(0.0);
-                disparity[after.clone()].fill(f32::NAN);
-                confidence[after].fill(0.0);
-                if columns.is_empty() {
+                if !area.rows.contains(&y) {
+                    disparity.fill(f32::NAN);
                     return;
                 }
+                disparity[..columns.start].fill(f32::NAN);
+                disparity[columns.end..].fill(f32::NAN);
                 let smooth = &mut smooth[columns.clone()];
-                speckles.erase(y, smooth);
                 let disparity = &mut disparity[columns.clone()];
                 let confidence = &mut confidence[columns.clone()];
-                dispatch!(level, simd => {
-                    trust.row(simd, evidence, &area, y, confidence);
-                    measure(smooth, offset, least, disparity, confidence);
-                });
+                speckles.erase(y, smooth);
+                dispatch!(level, _ => measure(smooth, offset, disparity, confidence));
                 if fills {
-                    fill(&roi.matched.row(y)[columns], disparity, confidence);
+                    fill(&roi.matched.row(y)[columns.clone()], disparity, confidence);
                 }
             },
         );
@@ -213,7 +223,7 @@ fn median<S: Simd>(
         &above[columns.clone()],
         &checked.row(y)[columns.clone()],
         &below[columns.clone()],
-        &mut smooth[columns.clone()],
+        smooth,
     );
 }
 
@@ -259,13 +269,20 @@ fn check_row(
     }
 }
 
-/// Disparities in pixels, and none where they are not trusted.
+/// Drops disparities that are trusted less than `least`.
 #[inline(always)]
-fn measure(smooth: &[i16], offset: f32, least: f32, disparity: &mut [f32], confidence: &mut [f32]) {
+fn distrust(smooth: &mut [i16], confidence: &[f32], least: f32) {
+    for (d, &c) in smooth.iter_mut().zip(confidence) {
+        *d = if c >= least { *d } else { NO_MATCH };
+    }
+}
+
+/// Disparities in pixels; no confidence where there is none.
+#[inline(always)]
+fn measure(smooth: &[i16], offset: f32, disparity: &mut [f32], confidence: &mut [f32]) {
     for ((d, c), &smooth) in disparity.iter_mut().zip(confidence).zip(smooth) {
-        let valid = smooth != NO_MATCH && *c >= least;
         let measured = smooth as f32 * DISPARITY_STEP - offset;
-        *d = if valid { measured } else { f32::NAN };
-        *c = if valid { *c } else { 0.0 };
+        *d = if smooth == NO_MATCH { f32::NAN } else { measured };
+        *c = if smooth == NO_MATCH { 0.0 } else { *c };
     }
 }

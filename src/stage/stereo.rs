@@ -51,10 +51,7 @@ impl Stereo {
         let stereo = &config.stereo;
         let lo = stereo.min_disparity.max(0) as usize;
         let settings = Settings {
-            penalties: Penalties {
-                p1: stereo.p1.clamp(0, 100) as u8,
-                p2: stereo.p2.clamp(stereo.p1, 100) as u8,
-            },
+            penalties: Penalties::of(stereo),
             method: match stereo.algorithm {
                 Algorithm::SemiGlobal => match stereo.paths {
                     4 => Method::FourPaths,

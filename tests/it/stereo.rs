@@ -13,7 +13,7 @@ use salient_stereo::stage::refine::Refine;
 use salient_stereo::stage::stereo::block::Measure;
 use salient_stereo::stage::stereo::cost::Penalties;
 use salient_stereo::stage::stereo::engine::{Engine, Method, Settings, Views};
-use salient_stereo::stage::stereo::plan::Plan;
+use salient_stereo::stage::stereo::plan::{LEAST, Plan};
 use salient_stereo::stage::stereo::{Matches, NO_MATCH, Stereo};
 
 use super::reference::{Noise, ODD_SIZES, stereo as plain};
@@ -172,6 +172,95 @@ proptest! {
             weight: None,
         };
         compare(&views, &plan, &settings, &[simd::detect()]);
+    }
+
+    #[test]
+    fn a_plan_covers_the_mask_once_and_searches_inside_the_range(
+        width in 1_usize..150,
+        height in 1_usize..80,
+        seed: u64,
+        rarity in 1_u64..400,
+        lo in 0_usize..64,
+        range in 16_usize..100,
+        fraction in 0.0_f32..1.0,
+    ) {
+        let size = Size::new(width, height);
+        let search = lo..lo + range;
+        let mut noise = Noise(seed);
+        let mask = Image::from_fn(size, |_, _| u8::from(noise.next().is_multiple_of(rarity)));
+        // Far outside the range as well.
+        let coarse = Image::from_fn(size.divided_by(CELL), |_, _| {
+            if noise.next().is_multiple_of(3) { f32::NAN } else { (noise.next() % 200) as f32 }
+        });
+        let mut plan = Plan::default();
+        plan.of_mask(&mask, fraction, Some(&coarse), &search);
+        let mut covered = Image::<u8>::new(size);
+        for band in &plan.bands {
+            for run in &plan.runs[band.runs.clone()] {
+                for (k, tile) in plan.tiles[run.tiles.clone()].iter().enumerate() {
+                    prop_assert!(tile.lo >= search.start && tile.lo + tile.n <= search.end);
+                    prop_assert!(tile.lo >= run.lo && tile.lo + tile.n <= run.hi);
+                    prop_assert!(run.lo >= band.lo && run.hi <= band.hi);
+                    prop_assert!(tile.n >= LEAST, "{tile:?}");
+                    let x0 = run.x0 + 32 * k;
+                    for y in band.y0..band.y1 {
+                        for x in x0..(x0 + 32).min(width) {
+                            covered.set(x, y, covered.get(x, y) + 1);
+                        }
+                    }
+                }
+            }
+        }
+        for (&times, &wanted) in covered.pixels().iter().zip(mask.pixels()) {
+            prop_assert!(times <= 1 && times >= wanted, "{times} tiles, {wanted} wanted");
+        }
+    }
+
+    #[test]
+    fn nothing_is_left_of_an_earlier_frame(seed: u64, first in 1_u64..300, second in 1_u64..300) {
+        let size = Size::new(110, 70);
+        let (left, right) = pair(size, seed);
+        let coarse = coarse_of(size, seed ^ 1);
+        let config = Config::default();
+        let settings = settings(Method::EightPaths, 0..24);
+        let mut noise = Noise(seed ^ 2);
+        let mut masks = [first, second].map(|rarity| {
+            Image::from_fn(size, |_, _| if noise.next().is_multiple_of(rarity) { 255 } else { 0 })
+        });
+        // The last one is empty but for a corner, now and then.
+        if seed.is_multiple_of(5) {
+            masks[1] = Image::from_fn(size, |x, y| if x > 90 && y > 60 { 255 } else { 0 });
+        }
+        let frame = |engine: &mut Engine, refine: &mut Refine, mask: &Image<u8>| {
+            let mut plan = Plan::default();
+            plan.of_mask(mask, 0.1, Some(&coarse), &settings.search);
+            let views = Views {
+                left: &left,
+                right: &right,
+                mask: Some(mask),
+                coarse: Some(&coarse),
+                weight: None,
+            };
+            let mut matches = Matches::default();
+            engine.run(&views, &plan, &mut matches);
+            let roi = RoiMask { salient: mask.clone(), matched: mask.clone(), fraction: 0.1 };
+            let (mut disparity, mut confidence) = (Image::default(), Image::default());
+            refine.run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
+            let disparity: Vec<_> = disparity.pixels().iter().map(|d| d.to_bits()).collect();
+            (matches, disparity, confidence)
+        };
+        let new = || {
+            let engine = Engine::new(settings.clone(), simd::detect());
+            (engine, Refine::new(&config, size))
+        };
+        let (mut engine, mut refine) = new();
+        frame(&mut engine, &mut refine, &masks[0]);
+        let (matches, disparity, confidence) = frame(&mut engine, &mut refine, &masks[1]);
+        let (mut engine, mut refine) = new();
+        let (expected, fresh, trusted) = frame(&mut engine, &mut refine, &masks[1]);
+        assert_same(&matches, &expected, "after another frame");
+        prop_assert_eq!(disparity, fresh);
+        prop_assert_eq!(confidence.pixels(), trusted.pixels());
     }
 
     #[test]

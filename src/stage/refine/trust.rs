@@ -38,11 +38,19 @@ impl Trust {
     }
 
     /// Writes the confidence of the pixels of row `y` in `area`, from the mean of
-    /// `evidence` over 9x9 pixels; nothing outside the area counts. A single cost
-    /// curve says little: that its neighbours are as clear, and none was
+    /// `evidence` over those of the 9x9 pixels around that are `matched`. A single
+    /// cost curve says little: that its neighbours are as clear, and none was
     /// rejected, says more.
     #[inline(always)]
-    pub fn row<S: Simd>(&self, _: S, evidence: &Image<u8>, area: &Area, y: usize, out: &mut [f32]) {
+    pub fn row<S: Simd>(
+        &self,
+        _: S,
+        evidence: &Image<u8>,
+        matched: &Image<u8>,
+        area: &Area,
+        y: usize,
+        out: &mut [f32],
+    ) {
         let rows =
             y.saturating_sub(RADIUS).max(area.rows.start)..(y + SIDE - RADIUS).min(area.rows.end);
         for (block, out) in out.chunks_mut(BLOCK).enumerate() {
@@ -50,27 +58,38 @@ impl Trust {
             // The window's columns, those outside the area empty.
             let from = x.saturating_sub(RADIUS).max(area.columns.start);
             let to = (x + BLOCK + RADIUS).min(area.columns.end);
-            let mut sums = [0_u16; SPAN];
+            let (mut sums, mut counts) = ([0_u16; SPAN], [0_u16; SPAN]);
             for y in rows.clone() {
-                let row = &evidence.row(y)[from..to];
-                for (sum, &e) in sums[from + RADIUS - x..].iter_mut().zip(row) {
+                let (row, mask) = (&evidence.row(y)[from..to], &matched.row(y)[from..to]);
+                let at = from + RADIUS - x;
+                let pixels = sums[at..].iter_mut().zip(&mut counts[at..]).zip(row).zip(mask);
+                for (((sum, count), &e), &m) in pixels {
                     *sum += e as u16;
+                    *count += (m != 0) as u16;
                 }
             }
-            // Nine neighbours as 1 + 2 * (2 * 2): at most 81 * 255, which fits.
-            let (mut twos, mut fours, mut means) = ([0; BLOCK + 7], [0; BLOCK + 4], [0; BLOCK]);
-            for (i, two) in twos.iter_mut().enumerate() {
-                *two = sums[i] + sums[i + 1];
-            }
-            for (i, four) in fours.iter_mut().enumerate() {
-                *four = twos[i] + twos[i + 2];
-            }
-            for (i, mean) in means.iter_mut().enumerate() {
-                *mean = (fours[i] + fours[i + 4] + sums[i + 8]) / (SIDE * SIDE) as u16;
-            }
-            for (out, mean) in out.iter_mut().zip(means) {
-                *out = self.table[(mean & 255) as usize];
+            let (sums, counts) = (nine(&sums), nine(&counts));
+            for ((out, sum), count) in out.iter_mut().zip(sums).zip(counts) {
+                // Whole numbers: a quotient is cut as that of integers.
+                let mean = sum as f32 / (count as f32).max(1.0);
+                *out = self.table[(mean as u8) as usize];
             }
         }
     }
+}
+
+/// Sums of nine neighbours each, as 1 + 2 * (2 * 2): at most 81 * 255, which fits.
+#[inline(always)]
+fn nine(columns: &[u16; SPAN]) -> [u16; BLOCK] {
+    let (mut twos, mut fours, mut sums) = ([0; BLOCK + 7], [0; BLOCK + 4], [0; BLOCK]);
+    for (i, two) in twos.iter_mut().enumerate() {
+        *two = columns[i] + columns[i + 1];
+    }
+    for (i, four) in fours.iter_mut().enumerate() {
+        *four = twos[i] + twos[i + 2];
+    }
+    for (i, sum) in sums.iter_mut().enumerate() {
+        *sum = fours[i] + fours[i + 4] + columns[i + 8];
+    }
+    sums
 }

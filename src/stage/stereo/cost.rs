@@ -1,5 +1,6 @@
 //! The matching cost: how far two descriptors differ.
 
+use crate::config;
 use crate::simd::prelude::*;
 use crate::simd::{Block, LANES, Simd, abs_diff, load, load_block, u8x32};
 use crate::stage::stereo::census::{OFFSETS, PLANES};
@@ -33,6 +34,11 @@ pub fn cost<S: Simd>(a: &Descriptors<S>, b: &Descriptors<S>) -> u8x32<S> {
         + ((a[2] ^ b[2]).count_ones() + abs_diff(a[3], b[3]).min(MAX_GRADIENT_COST))
 }
 
+/// Largest penalty. Path costs are bytes: a cost, P2 and, before the smallest is
+/// taken, P1 on top of P2.
+pub const MAX_PENALTY: u8 = 100;
+const _: () = assert!(MAX_COST as u32 + MAX_PENALTY as u32 <= 255 && 2 * MAX_PENALTY as u32 <= 255);
+
 /// Penalties of a disparity step between two pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Penalties {
@@ -43,6 +49,13 @@ pub struct Penalties {
 }
 
 impl Penalties {
+    /// Those of a configuration.
+    pub fn of(stereo: &config::Stereo) -> Self {
+        let most = i64::from(MAX_PENALTY);
+        let p1 = stereo.p1.clamp(0, most);
+        Self { p1: p1 as u8, p2: stereo.p2.clamp(p1, most) as u8 }
+    }
+
     /// P2 is never less than this, however strong the edge: a quarter of the way from P1 to P2.
     pub const fn least_p2(self) -> u8 {
         self.p1 + (self.p2 - self.p1) / 4

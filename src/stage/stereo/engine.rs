@@ -106,7 +106,7 @@ impl Rows<'_> {
 }
 
 impl Engine {
-    /// An engine for the current thread pool.
+    /// An engine without buffers: the first frame makes them.
     pub fn new(settings: Settings, level: Level) -> Self {
         Self { level, settings, scratch: Vec::new() }
     }
@@ -231,6 +231,7 @@ impl Scratch {
             shape: &shape,
             x0: run.x0,
             y0: band.y0,
+            first: settings.search.start,
             right: &mut self.right_winner,
             left: &mut *rows.left,
             evidence: &mut *rows.evidence,
@@ -281,6 +282,8 @@ pub struct Finish<'a> {
     shape: &'a RunShape<'a>,
     x0: usize,
     y0: usize,
+    /// First column with a partner.
+    first: usize,
     right: &'a mut RightWinner,
     left: &'a mut [i16],
     evidence: &'a mut [u8],
@@ -314,6 +317,10 @@ impl Finish<'_> {
         let evidence = &mut self.evidence[at..at + inside];
         left.copy_from_slice(&found.disparity[..inside]);
         evidence.copy_from_slice(&found.evidence[..inside]);
+        // The first columns have no partner at any disparity.
+        let blind = self.first.saturating_sub(x).min(inside);
+        left[..blind].fill(NO_MATCH);
+        evidence[..blind].fill(0);
         if let Some(mask) = self.views.mask {
             let mask = &mask.row(self.y0 + y)[x..x + inside];
             // Without a branch, so that it becomes vector code.

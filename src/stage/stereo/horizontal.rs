@@ -147,7 +147,8 @@ impl Horizontal {
         if let Some(seeds) = seeds {
             seeds.fill_column(&shape.tiles[0], shape, seeds.left, penalties.p2, &mut self.state);
         }
-        let mut floor = u8x32::splat(simd, 0);
+        // Nothing is known without seeds: 255 less 255 is a path that begins with nothing.
+        let mut floor = u8x32::splat(simd, if seeds.is_some() { 0 } else { 255 });
         for (k, tile) in shape.tiles.iter().enumerate() {
             let base = tile.lo - shape.lo;
             for (column, out) in volume.tile_mut(k).chunks_exact_mut(tile.n).enumerate() {
@@ -196,7 +197,8 @@ impl Horizontal {
                 &mut self.state,
             );
         }
-        let mut floor = u8x32::splat(simd, 0);
+        // Nothing is known without seeds: 255 less 255 is a path that begins with nothing.
+        let mut floor = u8x32::splat(simd, if seeds.is_some() { 0 } else { 255 });
         for (k, tile) in shape.tiles.iter().enumerate().rev() {
             let base = tile.lo - shape.lo;
             let mut floors = [[0; LANES]; LANES];

@@ -22,6 +22,10 @@ const REACH: usize = 12;
 /// Pixels by which the range exceeds the coarse disparities.
 const SLACK: f32 = 3.0;
 
+/// Least disparities of a tile, where so many are searched: fewer would have no
+/// second best that is no neighbour of the best.
+pub const LEAST: usize = 8;
+
 /// The same where the tile itself has too few of them.
 const FAR_REACH: usize = 48;
 const FAR_SLACK: f32 = 8.0;
@@ -190,8 +194,9 @@ fn next_clear(columns: &[u8], from: usize) -> usize {
 /// disparity, its surroundings are asked as well, and everything is searched
 /// where they know no more.
 fn narrowed(coarse: &Image<f32>, x0: usize, rows: &Range<usize>, search: &Range<usize>) -> Tile {
-    // No left pixel has a partner further away than the right image's border.
-    let end = search.end.min(x0 + LANES + 1).max(search.start + 1);
+    // What is not known from its surroundings has no partner further away than
+    // the right image's border.
+    let end = search.end.min((x0 + LANES + 1).max(search.start + LEAST));
     let all = Tile { lo: search.start, n: end - search.start };
     let window = |reach: usize| {
         let cells = |from: usize, to: usize, limit: usize| {
@@ -223,10 +228,12 @@ fn narrowed(coarse: &Image<f32>, x0: usize, rows: &Range<usize>, search: &Range<
             max = max.max(d);
         }
     }
-    if min > max {
+    let from = (min - slack).floor().max(0.0) as usize;
+    let to = (max + slack).ceil().max(0.0) as usize + 1;
+    if min > max || to <= search.start || from >= search.end {
         return all;
     }
-    let lo = ((min - slack).floor().max(0.0) as usize).clamp(search.start, end - 1);
-    let hi = ((max + slack).ceil().max(0.0) as usize + 1).clamp(lo + 1, end);
+    let hi = to.max(from + LEAST).min(search.end);
+    let lo = from.min(hi.saturating_sub(LEAST)).max(search.start);
     Tile { lo, n: hi - lo }
 }

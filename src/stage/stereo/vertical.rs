@@ -23,7 +23,8 @@ pub struct Vertical {
     /// vector on either side of the columns and of one disparity at either end
     /// that always holds 255 ("nothing known": such a value is later cut to P2).
     costs: Vec<u8>,
-    /// Their minimum over the disparities: layer, column.
+    /// Their minimum over the disparities: layer, column; 255 where nothing is
+    /// known, so that a path from there begins with nothing.
     floors: Vec<u8>,
     /// Which of its two layers holds a diagonal path's previous row: 0 or 1.
     turn: usize,
@@ -123,7 +124,7 @@ impl Vertical {
         self.costs.clear();
         self.costs.resize((shape.range() + 2) * self.slot::<DIAGONALS>(), 255);
         self.floors.clear();
-        self.floors.resize(self.slot::<DIAGONALS>(), 0);
+        self.floors.resize(self.slot::<DIAGONALS>(), 255);
         let most = shape.tiles.iter().map(|t| t.n).max().unwrap_or(0);
         self.sums.resize(most, [0; LANES]);
     }
@@ -147,6 +148,10 @@ impl Vertical {
         let used: &[usize] =
             if DIAGONALS { &[STRAIGHT, FROM_LEFT, FROM_RIGHT] } else { &[STRAIGHT] };
         for (k, tile) in shape.tiles.iter().enumerate() {
+            for layer in used {
+                let at = layer * self.stride + (k + 1) * LANES;
+                self.floors[at..at + LANES].fill(0);
+            }
             let coarse = std::array::from_fn(|i| seeds.at(k * LANES + i, y));
             for d in tile.lo..tile.lo + tile.n {
                 let lanes = Seeds::costs(&coarse, d, penalties.p2);

@@ -149,8 +149,8 @@ pub struct Seeds<'a> {
 /// Half pixels of 32 columns or rows; [`UNKNOWN`] where nothing is known.
 type HalfPixels = [i16; LANES];
 
-/// Further from any disparity than P2 can say.
-const UNKNOWN: i16 = -10_000;
+/// No disparity is preferred.
+const UNKNOWN: i16 = i16::MIN;
 
 impl Seeds<'_> {
     /// Coarse disparity at a run column and an image row.
@@ -162,12 +162,13 @@ impl Seeds<'_> {
     }
 
     /// Start of 32 paths: a cost of two per pixel of distance from the coarse
-    /// disparity, up to P2, which is also what stands for "anything".
+    /// disparity, up to P2; none where it is unknown.
     #[inline(always)]
     pub fn costs(coarse: &HalfPixels, d: usize, p2: u8) -> Block {
         let mut out = [0; LANES];
         for (out, &coarse) in out.iter_mut().zip(coarse) {
-            *out = (coarse - 2 * d as i16).abs().min(p2 as i16) as u8;
+            let cost = coarse.saturating_sub(2 * d as i16).saturating_abs().min(p2 as i16) as u8;
+            *out = if coarse == UNKNOWN { 0 } else { cost };
         }
         out
     }

@@ -151,15 +151,9 @@ impl RightWinner {
     }
 }
 
-/// By how much an index must be shifted to fit into a byte.
+/// By how much an index must be shifted to fit into a byte: a range is 512 at most.
 const fn shift_for(range: usize) -> u32 {
-    if range > 512 {
-        2
-    } else if range > 256 {
-        1
-    } else {
-        0
-    }
+    (range > 256) as u32
 }
 
 /// Winners of 32 pixels from their summed costs, a block per disparity from
@@ -175,9 +169,9 @@ pub fn winners<S: Simd>(simd: S, costs: &[Block], lo: usize, floors: &[u16; LANE
     let mut index = u8x32::splat(simd, 0);
     // The second best that is no neighbour of the best: of those two and more
     // below it when it was found, and of those two and more above it since.
-    let mut second = u8x32::splat(simd, 255);
-    let mut below = second;
-    let mut fresh = second.simd_eq(second);
+    let none = u8x32::splat(simd, 255);
+    let (mut second, mut below) = (none, none);
+    let mut fresh = none.simd_eq(none);
     for i in 1..n {
         let cost = load_block(simd, &costs[i]);
         let after = load_block(simd, &costs[(i + 1).min(n - 1)]);
@@ -193,6 +187,9 @@ pub fn winners<S: Simd>(simd: S, costs: &[Block], lo: usize, floors: &[u16; LANE
         fresh = better;
         before = cost;
     }
+    // So few disparities that all are neighbours are no evidence.
+    let alone = if n < 4 { second.simd_eq(none) } else { none.simd_lt(none) };
+    let second = alone.select(best, second);
     let (best, second, index) = (best.to_array(), second.to_array(), index.to_array());
     let (smaller, larger) = (smaller.to_array(), larger.to_array());
     // What follows is arithmetic of single pixels; each loop is over lanes and

@@ -47,10 +47,17 @@ struct Domain<'a> {
 }
 
 /// Path costs of one pixel by disparity, and their minimum.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct State {
     costs: HashMap<usize, u8>,
     floor: u8,
+}
+
+impl Default for State {
+    /// Nothing is known: 255 less 255 is a path that begins with nothing.
+    fn default() -> Self {
+        Self { costs: HashMap::new(), floor: 255 }
+    }
 }
 
 impl<'a> Domain<'a> {
@@ -109,17 +116,15 @@ impl<'a> Domain<'a> {
 
     /// What is known before the first pixel of a path.
     fn seed(&self, p: Point) -> State {
-        let mut state = State::default();
-        if let Some(coarse) = self.views.coarse {
-            let c = coarse.get_clamped(p.0 / CELL as isize, p.1 / CELL as isize);
-            if !c.is_nan() {
-                for d in self.range(p.0) {
-                    // The coarse disparity to the nearest half pixel.
-                    let slope = (2.0 * c + 0.5).floor() - 2.0 * d as f32;
-                    let most = f32::from(self.settings.penalties.p2);
-                    state.costs.insert(d, slope.abs().min(most) as u8);
-                }
-            }
+        let Some(coarse) = self.views.coarse else { return State::default() };
+        let mut state = State { costs: HashMap::new(), floor: 0 };
+        let c = coarse.get_clamped(p.0 / CELL as isize, p.1 / CELL as isize);
+        for d in self.range(p.0) {
+            // The coarse disparity to the nearest half pixel.
+            let slope = (2.0 * c + 0.5).floor() - 2.0 * d as f32;
+            let most = f32::from(self.settings.penalties.p2);
+            let cost = if c.is_nan() { 0 } else { slope.abs().min(most) as u8 };
+            state.costs.insert(d, cost);
         }
         state
     }
@@ -261,7 +266,7 @@ pub fn matches(views: &Views<'_>, plan: &Plan, settings: &Settings) -> Matches {
         evidence: Image::new(size),
     };
     for band in &plan.bands {
-        let shift = if band.hi - band.lo > 512 { 2 } else { u32::from(band.hi - band.lo > 256) };
+        let shift = u32::from(band.hi - band.lo > 256);
         // Of each right pixel: the least cost and its disparity.
         let mut right: HashMap<Point, (u8, usize)> = HashMap::new();
         for run in &plan.runs[band.runs.clone()] {
@@ -272,7 +277,8 @@ pub fn matches(views: &Views<'_>, plan: &Plan, settings: &Settings) -> Matches {
                     let p = (x as isize, y as isize);
                     let (costs, floors) = &sums[&p];
                     let range = domain.range(p.0);
-                    if views.mask.is_none_or(|mask| mask.get(x, y) != 0)
+                    if x >= settings.search.start
+                        && views.mask.is_none_or(|mask| mask.get(x, y) != 0)
                         && let Some((d, evidence)) = winner(costs, &range, u32::from(*floors))
                     {
                         out.left.set(x, y, d);
@@ -360,7 +366,9 @@ pub fn refined(
         }
         let right = matches.right.get((partner as usize).min(size.width - 1), y);
         let difference = (f64::from(right) - f64::from(d)).abs() / 32.0;
-        if difference <= config.stereo.disp12_max_diff as f64 + 0.5 { d } else { NO_MATCH }
+        // Right disparities of wide ranges are known to two pixels only.
+        let blur = if config.stereo.disparity_range > 256 { 1.0 } else { 0.5 };
+        if difference <= config.stereo.disp12_max_diff as f64 + blur { d } else { NO_MATCH }
     });
     let smooth = Image::from_fn(size, |x, y| {
         let centre = checked.get(x, y);
@@ -380,31 +388,31 @@ pub fn refined(
         window.sort_unstable();
         window[4]
     });
-    let patches = patches(&smooth, (config.stereo.speckle_range * 32.0) as i32);
-    let least = config.stereo.speckle_size as usize;
     let trust = |x: usize, y: usize| {
-        let mut sum = 0;
+        let (mut sum, mut count) = (0, 0);
         for v in y.saturating_sub(4)..(y + 5).min(size.height) {
             for u in x.saturating_sub(4)..(x + 5).min(size.width) {
-                if checked.get(u, v) != NO_MATCH {
-                    sum += u32::from(matches.evidence.get(u, v));
+                if matched.get(u, v) != 0 {
+                    count += 1;
+                    if checked.get(u, v) != NO_MATCH {
+                        sum += u32::from(matches.evidence.get(u, v));
+                    }
                 }
             }
         }
-        let mean = (sum / 81) as f32;
+        let mean = (sum / count.max(1)) as f32;
         let ratio = config.stereo.uniqueness_ratio as f32;
-        if mean < 255.0 * ratio / (100.0 + ratio) {
-            return 0.0;
-        }
-        1.0 - 0.48 * (-mean * (1.0 / 42.0)).exp()
+        let confidence = 1.0 - 0.48 * (-mean * (1.0 / 42.0)).exp();
+        let enough = mean >= 255.0 * ratio / (100.0 + ratio);
+        (enough && confidence >= config.min_confidence as f32).then_some(confidence)
     };
-    let valid = |x: usize, y: usize| {
-        let d = smooth.get(x, y);
-        d != NO_MATCH
-            && patches.get(x, y) >= least
-            && trust(x, y) > 0.0
-            && trust(x, y) >= config.min_confidence as f32
-    };
+    let trusted = Image::from_fn(size, |x, y| match trust(x, y) {
+        Some(_) => smooth.get(x, y),
+        None => NO_MATCH,
+    });
+    let patches = patches(&trusted, (config.stereo.speckle_range * 32.0) as i32);
+    let least = config.stereo.speckle_size as usize;
+    let valid = |x: usize, y: usize| trusted.get(x, y) != NO_MATCH && patches.get(x, y) >= least;
     let measured = |x, y| f32::from(smooth.get(x, y)) / 32.0;
     let mut disparity = Image::filled(size, f32::NAN);
     let mut confidence = Image::new(size);
@@ -412,7 +420,7 @@ pub fn refined(
         for x in 0..size.width {
             if valid(x, y) {
                 disparity.set(x, y, measured(x, y));
-                confidence.set(x, y, trust(x, y));
+                confidence.set(x, y, trust(x, y).unwrap_or(0.0));
             } else if config.stereo.fill == Fill::Roi && matched.get(x, y) != 0 {
                 let inside = |&x: &usize| matched.get(x, y) != 0;
                 let left = (0..x).rev().take_while(inside).find(|&x| valid(x, y));
