@@ -7,6 +7,7 @@ pub mod evaluate;
 pub mod export_bag;
 pub mod install_ament;
 pub mod node;
+mod print;
 pub mod render;
 pub mod replay;
 mod settings;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
+use crate::command::print::{put, say};
 use crate::command::settings::{Settings, bag_options};
 use crate::command::summary;
 use crate::command::watch::write_json;
@@ -100,13 +101,13 @@ pub fn run(args: &BenchArgs) -> Result<Outcome, CommandError> {
 
     let json = args.json.as_deref();
     if json.is_none_or(|path| path.as_os_str() != "-") {
-        println!(
+        say(format_args!(
             "{size}, {} disparities, {:.1} % of the image matched, {threads} threads, {} frames",
             config.stereo.disparity_range,
             100.0 * fraction,
             times.frames,
-        );
-        print!("{}", summary::times(&times));
+        ));
+        put(format_args!("{}", summary::times(&times)));
     }
     if let Some(path) = json {
         let mut document = serde_json::to_value(times).map_err(CommandError::failed)?;

@@ -13,6 +13,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use serde_json::json;
 
+use crate::command::print::{put, say};
 use crate::command::settings::Settings;
 use crate::command::watch::{progress_bar, stop_on_signal};
 use crate::command::{CommandError, Outcome};
@@ -89,13 +90,13 @@ pub fn run(args: &DemoArgs) -> Result<Outcome, CommandError> {
         RegionsListener::new(&mut camera, node.regions_topic()).map_err(CommandError::failed)?;
     let player = StereoPlayer::with_infos(&mut camera, recording.compressed, recording.infos)
         .map_err(CommandError::failed)?;
-    println!(
+    say(format_args!(
         "playing {} ({total} pairs) into left/image_rect and right/image_rect, domain {}{}",
         path.display(),
         environment.domain_id,
         if environment.localhost { ", this machine only" } else { "" }
-    );
-    println!("in another terminal: ros2 topic echo {}", node.regions_topic());
+    ));
+    say(format_args!("in another terminal: ros2 topic echo {}", node.regions_topic()));
 
     let bar = progress_bar(total as u64);
     let arrived = play_and_listen(player, listener, recording.messages, args.rate, &stop, &bar)?;
@@ -108,14 +109,14 @@ pub fn run(args: &DemoArgs) -> Result<Outcome, CommandError> {
     }
     let mut recorder = recorder.lock().unwrap_or_else(PoisonError::into_inner);
     let summary = recorder.finish()?;
-    println!();
-    println!(
+    say(format_args!(""));
+    say(format_args!(
         "{total} pairs in the bag, {} processed, {arrived} region arrays received over DDS",
         totals.processed
-    );
-    print!("{summary}");
-    println!("bag     {}", recorder.bag_path().display());
-    println!("report  {}", recorder.report_path().display());
+    ));
+    put(format_args!("{summary}"));
+    say(format_args!("bag     {}", recorder.bag_path().display()));
+    say(format_args!("report  {}", recorder.report_path().display()));
     if totals.displaced > 0 {
         eprintln!(
             "{} pairs were replaced by newer ones before they were processed: this machine does not keep up at this rate",
@@ -168,7 +169,7 @@ fn play_and_listen(
 fn print_array(bar: &ProgressBar, array: &SalientRegionArray) {
     let stamp = array.header.stamp;
     let line = |text: String| {
-        if bar.is_hidden() { println!("{text}") } else { bar.println(text) }
+        if bar.is_hidden() { say(format_args!("{text}")) } else { bar.println(text) }
     };
     let seen = array.regions.len();
     if seen == 0 {

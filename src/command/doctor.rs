@@ -15,6 +15,7 @@ pub use bag::examine_bag;
 pub use finding::{Finding, Severity};
 pub use graph::{Patient, examine_graph};
 
+use crate::command::print::say;
 use crate::command::replay::TopicArgs;
 use crate::command::settings::{Settings, bag_options};
 use crate::command::watch::stop_on_signal;
@@ -72,17 +73,17 @@ pub fn run(args: &DoctorArgs) -> Result<Outcome, CommandError> {
     } else {
         let environment = Environment::of_process().map_err(|e| usage(&e))?;
         let stop = stop_on_signal()?;
-        println!(
+        say(format_args!(
             "listening on domain {}{} for {} s as the node would …",
             environment.domain_id,
             if environment.localhost { ", this machine only" } else { "" },
             args.seconds
-        );
+        ));
         let patient = Patient { remaps: &ros.remaps, names: &names, config: &config };
         examine_graph(&patient, &environment, args.seconds, &stop).map_err(CommandError::failed)?
     };
     for finding in &findings {
-        println!("{finding}");
+        say(format_args!("{finding}"));
     }
     let count = |severity| findings.iter().filter(|f| f.severity == severity).count();
     match (count(Severity::Fault), count(Severity::Warning)) {

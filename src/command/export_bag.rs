@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 
+use crate::command::print::say;
 use crate::command::replay::losses;
 use crate::command::watch::{progress_bar, stop_on_signal};
 use crate::command::{CommandError, Outcome};
@@ -67,12 +68,12 @@ pub fn run(args: &ExportBagArgs) -> Result<Outcome, CommandError> {
     })
     .map_err(CommandError::failed)?;
     bar.finish_and_clear();
-    println!(
+    say(format_args!(
         "{}: {} pairs, {} true disparity maps",
         args.output.display(),
         exported.pairs,
         exported.disparities
-    );
+    ));
     let tally = source.tally();
     for line in losses(tally) {
         eprintln!("{line}");

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use thiserror::Error;
 
+use crate::command::print::say;
 use crate::command::{CommandError, Outcome};
 use files::SHARED;
 use setup::SCRIPTS;
@@ -77,13 +78,13 @@ pub fn run(args: &InstallAmentArgs) -> Result<Outcome, CommandError> {
         .map_err(|source| CommandError::failed(InstallError::Unknown { source }))?;
     let folder = this.parent().unwrap_or(Path::new("."));
     let installed = install(&args.prefix, folder).map_err(CommandError::failed)?;
-    println!("{} files written to {}", installed.written.len(), args.prefix.display());
+    say(format_args!("{} files written to {}", installed.written.len(), args.prefix.display()));
     for kept in &installed.kept {
-        println!("{} belongs to somebody else and was left alone", kept.display());
+        say(format_args!("{} belongs to somebody else and was left alone", kept.display()));
     }
     let prefix = fs::canonicalize(&args.prefix).unwrap_or_else(|_| args.prefix.clone());
-    println!("source {}/setup.bash", prefix.display());
-    println!("ros2 launch {PACKAGE} salient_stereo.launch.py namespace:=/stereo");
+    say(format_args!("source {}/setup.bash", prefix.display()));
+    say(format_args!("ros2 launch {PACKAGE} salient_stereo.launch.py namespace:=/stereo"));
     Ok(Outcome::Done)
 }
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use thiserror::Error;
 
+use crate::command::print::say;
 use crate::config::Config;
 use crate::ros::NODE_NAME;
 use crate::ros::args::{ArgsError, RosArgs};
@@ -83,7 +84,7 @@ pub fn run_to_exit(args: &NodeArgs) -> ExitCode {
 pub fn run(args: &NodeArgs) -> Result<ExitCode, NodeCommandError> {
     let (ros, rest) = RosArgs::split(args.arguments.iter().cloned())?;
     if rest.iter().any(|argument| argument == "--help" || argument == "-h") {
-        println!("{HELP}");
+        say(format_args!("{HELP}"));
         return Ok(ExitCode::SUCCESS);
     }
     let names = ros.names("/", NODE_NAME)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
+use crate::command::print::say;
 use crate::image::Size;
 use crate::input::synthetic::{SceneKind, SyntheticError, SyntheticScene};
 use crate::output::scene::{SceneBag, SceneMessages, SceneWriteError};
@@ -72,12 +73,12 @@ pub fn run(args: &RenderArgs) -> Result<(), RenderError> {
     }
     bag.finish()?;
     progress.finish_and_clear();
-    println!(
+    say(format_args!(
         "{}: {} pairs of {} at {} Hz, with truth",
         args.output.display(),
         options.frames,
         options.size,
         options.rate_hz
-    );
+    ));
     Ok(())
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use clap::Args;
 use serde_json::{Value, json};
 
+use crate::command::print::{put, say};
 use crate::command::settings::{Settings, bag_options};
 use crate::command::summary;
 use crate::command::watch::{make_parent, progress_bar, stop_on_signal, write_json};
@@ -208,12 +209,12 @@ fn conclude(
         write_json(path, &document)?;
     }
     if json.is_none_or(|path| path.as_os_str() != "-") {
-        println!("{} pairs, {} regions", tally.pairs, totals.regions);
+        say(format_args!("{} pairs, {} regions", tally.pairs, totals.regions));
         if let Some(times) = totals.stats.summary() {
-            print!("{}", summary::times(&times));
+            put(format_args!("{}", summary::times(&times)));
         }
         if let Some(score) = score {
-            print!("{}", summary::scores(score));
+            put(format_args!("{}", summary::scores(score)));
         }
     }
     for line in losses(tally) {

@@ -2,7 +2,7 @@
 //! message and its exit code, and nothing panics.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use salient_stereo::output::bag::{BagWriter, Packing};
 use salient_stereo::ros::message::sensor_msgs::{CameraInfo, Image};
@@ -119,6 +119,25 @@ impl Run {
             assert!(self.errors.contains(word), "'{word}' is not in: {}", self.errors);
         }
     }
+}
+
+#[test]
+fn a_reader_that_goes_away_ends_the_printing_and_not_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("out.mcap");
+    let mut child = tool()
+        .args(["render", "--scene", "tabletop", "--frames", "2", "-o"])
+        .arg(&bag)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(!errors.contains("panicked"), "{errors}");
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+    assert!(bag.exists());
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::command::CommandError;
+use crate::command::print::put;
 use crate::command::watch::{make_parent, write_file, write_json};
 use crate::evaluation::{self, Evaluation, Part, Peer, Peers, readme, report};
 
@@ -101,7 +102,7 @@ impl Checked {
                 write_file(path, evaluation::markdown(&evaluation).as_bytes())?;
             }
             None if quiet => {}
-            _ => print!("{}", evaluation::markdown(&evaluation)),
+            _ => put(format_args!("{}", evaluation::markdown(&evaluation))),
         }
         Ok(())
     }
