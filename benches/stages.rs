@@ -1,4 +1,4 @@
-//! Time of the matching stages on a rendered street, on one thread.
+//! Time of the attention and matching stages on a rendered street, on one thread.
 //!
 //! ```text
 //! cargo bench --bench stages
@@ -16,6 +16,8 @@ use salient_stereo::simd;
 use salient_stereo::stage::coarse::{Coarse, CoarseDisparity};
 use salient_stereo::stage::preprocess::Preprocess;
 use salient_stereo::stage::refine::Refine;
+use salient_stereo::stage::roi::Roi;
+use salient_stereo::stage::saliency::{Previous, Saliency, Scene as SaliencyScene};
 use salient_stereo::stage::stereo::{Matches, Stereo};
 
 const SIZE: Size = Size::new(1242, 375);
@@ -105,6 +107,43 @@ impl Scene {
         run
     }
 
+    /// The second of two frames of a camera that stands still.
+    fn attention(&mut self) -> impl FnMut() + '_ {
+        let mut stage = Saliency::new(&self.config, SIZE, simd::detect());
+        let (mut previous, mut cells) = (Previous::default(), Image::default());
+        let Self { perception, coarse, saliency, .. } = self;
+        let mut run = move || {
+            let Perception { stamp, left, rig, .. } = &*perception;
+            let scene = SaliencyScene { stamp: *stamp, left, coarse, rig };
+            stage.run(&scene, &mut previous, &mut cells, saliency);
+        };
+        run();
+        run
+    }
+
+    fn region_of_interest(&mut self) -> impl FnMut() + '_ {
+        drop(self.attention());
+        self.check_attention();
+        let cells = Image::from_fn(SIZE.divided_by(4), |x, y| {
+            self.saliency.get((4 * x + 1).min(SIZE.width - 1), (4 * y + 1).min(SIZE.height - 1))
+        });
+        let mut stage = Roi::new(&self.config, SIZE);
+        let Self { perception, coarse, saliency, roi, .. } = self;
+        move || stage.run(&cells, saliency, coarse, &perception.rig, roi)
+    }
+
+    /// True objects are more salient than the rest by far.
+    fn check_attention(&self) {
+        let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
+        let objects = self.truth.objects.as_ref().unwrap();
+        for (&s, &id) in self.saliency.pixels().iter().zip(objects.pixels()) {
+            sums[usize::from(id != 0)] += f64::from(s);
+            counts[usize::from(id != 0)] += 1.0;
+        }
+        let [rest, objects] = [0, 1].map(|i| sums[i] / counts[i]);
+        assert!(objects > 2.0 * rest, "objects have {objects:.2}, the rest {rest:.2}");
+    }
+
     /// Most of the region has a disparity, and hardly any is wrong.
     fn check(&self) {
         let truth = self.truth.disparity.as_ref().unwrap();
@@ -128,6 +167,18 @@ impl Scene {
 fn coarse(bencher: Bencher<'_, '_>) {
     let mut scene = Scene::new(1.0);
     bencher.bench_local(scene.coarse());
+}
+
+#[divan::bench]
+fn attention(bencher: Bencher<'_, '_>) {
+    let mut scene = Scene::new(1.0);
+    bencher.bench_local(scene.attention());
+}
+
+#[divan::bench]
+fn region_of_interest(bencher: Bencher<'_, '_>) {
+    let mut scene = Scene::new(1.0);
+    bencher.bench_local(scene.region_of_interest());
 }
 
 #[divan::bench(args = [0.25, 1.0])]

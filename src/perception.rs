@@ -10,6 +10,7 @@ pub use time::{Clock, Stage, StageTimes};
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Picture, Size};
+use crate::stage::ground::GroundState;
 use crate::stamp::Stamp;
 
 /// Sub-pixel step of [`Perception::disparity`] in pixels.
@@ -70,6 +71,8 @@ pub struct Perception {
     pub rig: Arc<StereoRig>,
     /// The left view as processed: every image below has its size.
     pub left: View,
+    /// Whether attention reckons with a ground plane.
+    pub ground: GroundState,
     /// Attention map S of eq. 4, 0..=1.
     pub saliency: Image<f32>,
     /// Region of interest.
@@ -109,6 +112,7 @@ impl Perception {
                 gray: Image::new(size),
                 gradient: Image::new(size),
             },
+            ground: GroundState::default(),
             saliency: Image::new(size),
             roi: RoiMask { salient: Image::new(size), matched: Image::new(size), fraction: 0.0 },
             disparity: Image::filled(size, f32::NAN),

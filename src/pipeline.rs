@@ -11,14 +11,16 @@ use crate::stage::preprocess::Preprocess;
 use crate::stage::refine::Refine;
 use crate::stage::regions::{RegionSource, Regions};
 use crate::stage::roi::Roi;
+use crate::stage::roi::latency::Latency;
 use crate::stage::saliency::{Previous, Saliency, Scene};
 use crate::stage::stereo::{Matches, Stereo};
 use crate::stage::track::{self, Track};
 
 /// The stages and their buffers for pictures of one size.
 ///
-/// Two registers look back in time: `previous` and `track`. Everything else
-/// depends on the current frame alone.
+/// Two registers look back in time: `previous` and `track`. With a time budget
+/// `latency` does so as well, and what is matched depends on the machine.
+/// Everything else depends on the current frame alone.
 pub struct Pipeline {
     preprocess: Preprocess,
     coarse: Coarse,
@@ -31,6 +33,7 @@ pub struct Pipeline {
     track: Track,
 
     previous: Previous,
+    latency: Latency,
 
     right: View,
     coarse_disparity: CoarseDisparity,
@@ -57,6 +60,7 @@ impl Pipeline {
             regions: Regions::new(config, size),
             track: Track::new(config),
             previous: Previous::default(),
+            latency: Latency::new(config.max_latency),
             right: View::default(),
             coarse_disparity: CoarseDisparity::default(),
             attention: Image::default(),
@@ -138,8 +142,10 @@ impl Pipeline {
             rig: &out.rig,
         };
         self.saliency.run(&scene, &mut self.previous, &mut self.attention, &mut out.saliency);
+        out.ground = self.saliency.ground().map(Ground::state).unwrap_or_default();
         lap.mark(&mut out.times, Stage::Saliency);
 
+        self.roi.set_allowance(self.latency.allowance(lap.total_ms));
         self.roi.run(
             &self.attention,
             &out.saliency,
@@ -148,6 +154,7 @@ impl Pipeline {
             &mut out.roi,
         );
         lap.mark(&mut out.times, Stage::Roi);
+        let before_matching_ms = lap.total_ms;
 
         self.stereo.run(
             &out.left,
@@ -181,6 +188,7 @@ impl Pipeline {
         let views = track::Views { disparity: &out.disparity, labels: &out.labels };
         self.track.run(frame.stamp, &out.rig, views, &mut out.regions, &mut out.rejections);
         lap.mark(&mut out.times, Stage::Track);
+        self.latency.learn(lap.total_ms - before_matching_ms, f64::from(out.roi.fraction));
     }
 }
 
@@ -188,16 +196,20 @@ impl Pipeline {
 struct Lap {
     clock: Clock,
     last: u64,
+    /// Milliseconds from the start to the last mark.
+    total_ms: f64,
 }
 
 impl Lap {
     fn start(clock: Clock) -> Self {
-        Self { clock, last: clock.now() }
+        Self { clock, last: clock.now(), total_ms: 0.0 }
     }
 
     fn mark(&mut self, times: &mut StageTimes, stage: Stage) {
         let now = self.clock.now();
-        times.set(stage, (now - self.last) as f64 * 1e-6);
+        let lap_ms = (now - self.last) as f64 * 1e-6;
+        times.set(stage, lap_ms);
+        self.total_ms += lap_ms;
         self.last = now;
     }
 }

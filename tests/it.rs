@@ -9,6 +9,7 @@ mod it {
     mod depth;
     #[cfg(feature = "tool")]
     mod doctor;
+    mod ego;
     #[cfg(feature = "tool")]
     mod evaluate;
     #[cfg(feature = "tool")]
@@ -23,6 +24,7 @@ mod it {
     mod live;
     #[cfg(feature = "tool")]
     mod metric;
+    mod on_plane;
     #[cfg(feature = "tool")]
     mod params;
     #[cfg(feature = "tool")]

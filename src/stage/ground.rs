@@ -10,10 +10,10 @@ const STRIPS: usize = 16;
 /// unless a thing stands on the image's edge.
 const FOOT: usize = 6;
 /// Share of those that must lie on a plane to begin with: a street between
-/// parked cars shows a half, walls and cloths below a quarter.
-const ACQUIRE: f32 = 0.35;
+/// parked cars shows a half, a narrow corridor a third, cloths and walls below a quarter.
+const ACQUIRE: f32 = 0.28;
 /// The same to go on with the last plane.
-const KEEP: f32 = 0.2;
+const KEEP: f32 = 0.15;
 /// Least change of disparity over what is seen of a plane, in tolerances: a
 /// smaller one is no tilt but noise. A floor seen from 70 degrees above with an
 /// opening angle of 40 has 4.4.

@@ -3,6 +3,7 @@
 pub mod bits;
 pub mod budget;
 pub mod cells;
+pub mod latency;
 pub mod threshold;
 
 use crate::camera::StereoRig;
@@ -34,6 +35,7 @@ pub struct Roi {
     min_area: u32,
     dilation: usize,
     max_fraction: f64,
+    allowance: f64,
     salient: BitMask,
     matched: BitMask,
     components: Components,
@@ -55,6 +57,7 @@ impl Roi {
             min_area: u32::try_from(config.regions.min_area).unwrap_or(0),
             dilation: usize::try_from(config.roi.dilation).unwrap_or(0),
             max_fraction: config.roi.max_fraction,
+            allowance: 1.0,
             salient: BitMask::default(),
             matched: BitMask::default(),
             components: Components::default(),
@@ -67,13 +70,19 @@ impl Roi {
         self.rectangle = Some(fraction.clamp(0.0, 1.0));
     }
 
+    /// From now on at most this share of the image is matched, even where
+    /// `roi.max_fraction` allows more.
+    pub fn set_allowance(&mut self, fraction: f64) {
+        self.allowance = fraction;
+    }
+
     /// The mask from the attention map: `attention` per cell, `saliency` per pixel.
     ///
     /// `salient` is S >= τ where `depth.min` <= Z <= `depth.max` by the coarse disparity
     /// (cells without one pass), opened and closed, less components smaller
     /// than `regions.min_area`. `matched` is `salient` dilated by a square of
-    /// `roi.dilation` pixels to each side. When it exceeds `roi.max_fraction`,
-    /// both are cut to the most salient tiles.
+    /// `roi.dilation` pixels to each side. When it exceeds `roi.max_fraction`
+    /// or the allowance, both are cut to the most salient tiles.
     pub fn run(
         &mut self,
         attention: &Image<f32>,
@@ -133,7 +142,7 @@ impl Roi {
     }
 
     fn keep_budget(&mut self, attention: &Image<f32>) {
-        let limit = (self.max_fraction * self.size.area() as f64) as usize;
+        let limit = (self.max_fraction.min(self.allowance) * self.size.area() as f64) as usize;
         if self.matched.count() > limit {
             self.budget.choose(&self.matched, attention, limit);
             self.budget.apply(&mut self.matched);

@@ -5,10 +5,13 @@
 //! every cue. The map is smoothed over time and brought to full size at the end.
 
 pub mod barrier;
+pub mod beside;
 pub mod boundary;
 mod cells;
 pub mod color;
+pub mod columns;
 pub mod depth;
+pub mod ego;
 pub mod flow;
 pub mod frequency_tuned;
 pub mod integral;
@@ -70,6 +73,8 @@ pub struct AttentionScene<'a> {
     /// The frame before; `None` on the first frame and after a reset, when
     /// whoever keeps a state of its own starts anew.
     pub previous: Option<&'a PreviousFrame>,
+    /// Where the cells were in the frame before, for the mode that asks for it.
+    pub flow: Option<&'a Flow>,
 }
 
 /// What is remembered of one frame.
@@ -186,6 +191,13 @@ impl Saliency {
         }
         shrink_view(self.level, scene.left, &mut self.cells);
         let before = previous.get(cells);
+        let compensates = matches!(self.mode, Mode::Scene(_));
+        if let Some(before) = before.filter(|_| compensates || self.smoothing > 0.0) {
+            self.flow.run(&before.gray, &self.cells.gray);
+            if compensates {
+                self.flow.sharpen();
+            }
+        }
         let scene = AttentionScene {
             stamp: scene.stamp,
             left: scene.left,
@@ -193,6 +205,7 @@ impl Saliency {
             coarse: scene.coarse,
             rig: scene.rig,
             previous: before,
+            flow: before.filter(|_| compensates).map(|_| &self.flow),
         };
         match &mut self.mode {
             Mode::Scene(mode) => mode.run(&scene, attention),
@@ -202,7 +215,6 @@ impl Saliency {
             Mode::FullFrame => {}
         }
         if let Some(before) = before.filter(|_| self.smoothing > 0.0) {
-            self.flow.run(&before.gray, &self.cells.gray);
             smooth(attention, &before.attention, &self.flow, self.smoothing);
         }
         previous.set(scene.stamp, &self.cells.gray, attention);

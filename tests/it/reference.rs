@@ -4,6 +4,7 @@
 pub mod preprocess;
 pub mod roi;
 pub mod saliency;
+pub mod scene;
 pub mod stereo;
 
 use salient_stereo::image::{Image, Size};

@@ -86,6 +86,7 @@ impl World {
             coarse: &self.coarse,
             rig: &self.rig,
             previous: self.previous.as_ref(),
+            flow: None,
         }
     }
 

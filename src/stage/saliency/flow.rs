@@ -27,6 +27,22 @@ const STIFFNESS: u32 = 12;
 const SURE: f32 = 16.0;
 const FADE: f32 = 16.0;
 
+/// Mean rise of the difference in gray levels, one pixel off the best place,
+/// from which that place is taken to parts of a pixel.
+const LEAST_RISE: f32 = 0.75;
+/// The same, summed over both axes, from which a block's shift is firm.
+const FIRM_RISE: f32 = 4.0;
+
+/// How a block moved.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BlockShift {
+    /// Columns and rows from the block to its place in the previous frame, to
+    /// parts of a pixel.
+    pub shift: [f32; 2],
+    /// 0 where any other shift would do as well, 1 where texture holds the block firm.
+    pub firmness: f32,
+}
+
 /// Block matching from coarse to fine on the quarter-size gray view.
 pub struct Flow {
     level: Level,
@@ -35,6 +51,8 @@ pub struct Flow {
     grid: Image<[i32; 2]>,
     next: Image<[i32; 2]>,
     block: Image<f32>,
+    /// One per 4x4 pixels: see [`Flow::sharpen`].
+    pub blocks: Image<BlockShift>,
     /// Columns from each cell to its place in the previous frame.
     pub dx: Image<f32>,
     /// Rows from each cell to its place in the previous frame.
@@ -54,6 +72,7 @@ impl Flow {
             grid: Image::default(),
             next: Image::default(),
             block: Image::default(),
+            blocks: Image::default(),
             dx: Image::default(),
             dy: Image::default(),
             trust: Image::default(),
@@ -88,6 +107,53 @@ impl Flow {
         }
         upsample(&self.block, size, &mut self.trust);
     }
+
+    /// Fills [`Flow::blocks`]: the shifts of the last run to parts of a pixel.
+    ///
+    /// Around its minimum the sum of absolute differences has the shape of a V
+    /// with arms of one slope: with values l and r one pixel to either side of
+    /// the lowest, c, it is at (l − r) / (2 (max(l, r) − c)).
+    pub fn sharpen(&mut self) {
+        self.blocks.resize(self.grid.size());
+        let Self { level, now: [now, ..], before: [before, ..], grid, blocks, .. } = self;
+        dispatch!(*level, _simd => {
+            for y in 0..grid.height() {
+                for x in 0..grid.width() {
+                    blocks.set(x, y, sharpened(now, before, (x, y), grid.get(x, y)));
+                }
+            }
+        });
+    }
+}
+
+#[inline(always)]
+fn sharpened(
+    now: &Image<u8>,
+    before: &Image<u8>,
+    block: (usize, usize),
+    best: [i32; 2],
+) -> BlockShift {
+    let mean = |shift| cost(now, before, block, shift).map(|c| c as f32 / (BLOCK * BLOCK) as f32);
+    let mut out = BlockShift { shift: best.map(|shift| shift as f32), firmness: 0.0 };
+    let Some(lowest) = mean(best) else { return out };
+    let mut rises = 0.0;
+    for axis in 0..2 {
+        let step = |by: i32| {
+            let mut shift = best;
+            shift[axis] += by;
+            mean(shift)
+        };
+        let (less, more) = (step(-1), step(1));
+        let rise = less.unwrap_or(lowest).max(more.unwrap_or(lowest)) - lowest;
+        rises += rise.max(0.0);
+        if let (Some(less), Some(more)) = (less, more)
+            && rise >= LEAST_RISE
+        {
+            out.shift[axis] += ((less - more) / (2.0 * rise)).clamp(-0.5, 0.5);
+        }
+    }
+    out.firmness = (rises / FIRM_RISE).min(1.0);
+    out
 }
 
 /// Shifts of the blocks of one level from those of the coarser one, of which

@@ -9,18 +9,23 @@ mod without_plane;
 
 use super::AttentionScene;
 use super::barrier::Barrier;
+use super::ego::EgoMotion;
 use crate::image::Image;
 use crate::simd::Level;
 use crate::stage::ground::Ground;
 
 use on_plane::OnPlane;
-use without_plane::WithoutPlane;
+use without_plane::{Cues, WithoutPlane};
+
+/// Share of measured cells from which a frame counts as one with depth.
+const LEAST_MEASURED: f32 = 0.15;
 
 /// The mode with its cues.
 #[derive(Debug)]
 pub struct SceneSaliency {
     ground: Ground,
     barrier: Barrier,
+    ego: EgoMotion,
     on_plane: OnPlane,
     without_plane: WithoutPlane,
     fourth: Image<u8>,
@@ -33,7 +38,8 @@ impl SceneSaliency {
     pub fn new(level: Level) -> Self {
         Self {
             ground: Ground::default(),
-            barrier: Barrier::default(),
+            barrier: Barrier::new(level),
+            ego: EgoMotion::default(),
             on_plane: OnPlane::new(level),
             without_plane: WithoutPlane::default(),
             fourth: Image::default(),
@@ -55,9 +61,18 @@ impl SceneSaliency {
         self.ground.run(&scene.coarse.checked, scene.rig);
         self.scale_disparity(scene);
         self.barrier.run(&scene.cells.rgb, &self.fourth, &mut self.color, &mut self.relief);
-        match self.ground.plane() {
-            Some(plane) => self.on_plane.run(plane, scene, &self.color, out),
-            None => self.without_plane.run(scene, &self.color, &self.relief, out),
+        let measured = scene.coarse.checked.pixels().iter().filter(|d| **d >= 1.0).count();
+        let has_depth = measured as f32 >= LEAST_MEASURED * out.size().area() as f32;
+        let motion = match scene.flow {
+            Some(flow) if self.ego.run(flow, scene, has_depth) => Some(&self.ego),
+            _ => None,
+        };
+        if let Some(plane) = self.ground.plane() {
+            let motion = motion.map(|ego| &ego.motion);
+            self.on_plane.run(plane, scene, &self.color, motion, out);
+        } else {
+            let cues = Cues { barrier: &self.color, relief: &self.relief, motion };
+            self.without_plane.run(scene, &cues, has_depth, out);
         }
     }
 

@@ -1,16 +1,38 @@
-//! Where there is no ground: what cannot be reached from the border, near the centre.
+//! Where there is no ground: what cannot be reached from the border, near the
+//! centre, or moves by itself.
 
 use crate::image::Image;
 use crate::stage::saliency::AttentionScene;
 use crate::stage::saliency::boundary::Boundary;
+use crate::stage::saliency::ego::EgoMotion;
 
-/// Share of measured cells from which a frame counts as one with depth.
-const LEAST_MEASURED: f32 = 0.15;
-/// Sum of the barriers of Y, Cb and Cr that counts fully, with depth and without.
+/// Sum of the barriers of Y, Cb and Cr that counts fully: in a still with
+/// depth, in one without, and in a video.
 const FULL_BARRIER: f32 = 180.0;
-const FULL_BARRIER_STILL: f32 = 120.0;
+const FULL_BARRIER_PICTURE: f32 = 120.0;
+const FULL_BARRIER_VIDEO: f32 = 90.0;
+/// What falls off towards the edge, in squares of the relative distance from
+/// the centre: as above. A camera that follows something need not hold it in
+/// the middle.
+const SPREAD: f32 = 2.0;
+const SPREAD_PICTURE: f32 = 4.0;
+const SPREAD_VIDEO: f32 = 1.0;
 /// Sum of Mahalanobis distances from three sides that counts fully.
 const FULL_BOUNDARY: f32 = 12.0;
+/// What a barrier of disparity over the full range adds.
+const RELIEF: f32 = 0.1;
+/// What rests is worth beside what moves as this to this and 1.
+const REST: f32 = 0.5;
+
+/// What the mode knows of a frame, per cell.
+pub struct Cues<'a> {
+    /// Sum of the barriers of Y, Cb and Cr, 0..=765.
+    pub barrier: &'a Image<f32>,
+    /// Barrier of disparity, 0..=255.
+    pub relief: &'a Image<f32>,
+    /// Motion beside the camera's own, in a video.
+    pub motion: Option<&'a EgoMotion>,
+}
 
 /// Attention without a ground, with its cues.
 #[derive(Debug, Default)]
@@ -20,39 +42,49 @@ pub struct WithoutPlane {
 }
 
 impl WithoutPlane {
-    /// S per cell from the sum of the `barriers` of Y, Cb and Cr and from
-    /// `relief`, the barrier of disparity.
+    /// S per cell, r² being the squared relative distance from the centre:
     ///
-    /// A picture without disparity is of things more often than not, and the
-    /// boundary contrast helps: the geometric mean of both. With disparity a
-    /// bare table or wall may fill the view, whose shading the boundary
-    /// contrast takes for a thing: the barrier alone, and relief.
+    /// - in a still with depth (`C_MB` + .1 relief) · exp(−2 r²);
+    /// - in a picture without it 1.2 · √(`C_MB` · boundary contrast) · exp(−4 r²):
+    ///   such a picture is of things more often than not. With disparity a bare
+    ///   table or wall may fill the view, whose shading the boundary contrast
+    ///   takes for a thing;
+    /// - in a video (`C_MB` + .1 relief) · exp(−r²) · (.5 + `C_M`) / (.5 + m),
+    ///   limited to 1, where m is the motion that a tenth of the view exceeds:
+    ///   where all rests motion says nothing.
     pub fn run(
         &mut self,
         scene: &AttentionScene<'_>,
-        barrier: &Image<f32>,
-        relief: &Image<f32>,
+        cues: &Cues<'_>,
+        has_depth: bool,
         out: &mut Image<f32>,
     ) {
-        self.boundary.run(&scene.cells.rgb, &mut self.border);
-        let measured = scene.coarse.checked.pixels().iter().filter(|d| **d >= 1.0).count();
-        let has_depth = measured as f32 >= LEAST_MEASURED * out.size().area() as f32;
+        let of_things = cues.motion.is_none() && !has_depth;
+        if of_things {
+            self.boundary.run(&scene.cells.rgb, &mut self.border);
+        }
+        let (full, spread) = match cues.motion {
+            Some(_) => (FULL_BARRIER_VIDEO, SPREAD_VIDEO),
+            None if has_depth => (FULL_BARRIER, SPREAD),
+            None => (FULL_BARRIER_PICTURE, SPREAD_PICTURE),
+        };
         let (width, height) = (out.width() as f32, out.height() as f32);
         for y in 0..out.height() {
-            let (color, border) = (barrier.row(y), self.border.row(y));
-            let relief = relief.row(y);
+            let (barrier, relief) = (cues.barrier.row(y), cues.relief.row(y));
             let v = (y as f32 + 0.5) / height - 0.5;
             for (x, out) in out.row_mut(y).iter_mut().enumerate() {
                 let u = (x as f32 + 0.5) / width - 0.5;
-                let radius = u * u + v * v;
-                let (appearance, spread) = if has_depth {
-                    ((color[x] / FULL_BARRIER).min(1.0) + 0.1 * relief[x] / 255.0, 2.0)
+                let barrier = (barrier[x] / full).min(1.0);
+                let appearance = if of_things {
+                    let contrast = (self.border.get(x, y) / FULL_BOUNDARY).min(1.0);
+                    1.2 * (barrier * contrast).sqrt()
                 } else {
-                    let barrier = (color[x] / FULL_BARRIER_STILL).min(1.0);
-                    let contrast = (border[x] / FULL_BOUNDARY).min(1.0);
-                    (1.2 * (barrier * contrast).sqrt(), 4.0)
+                    barrier + RELIEF * relief[x] / 255.0
                 };
-                *out = (appearance * (-spread * radius).exp()).min(1.0);
+                let stirs = cues.motion.map_or(1.0, |ego| {
+                    ((REST + ego.motion.get(x, y)) / (REST + ego.most)).min(1.0)
+                });
+                *out = (appearance * (-spread * (u * u + v * v)).exp() * stirs).min(1.0);
             }
         }
     }
