@@ -15,6 +15,7 @@ use crate::output::AnySink;
 use crate::perception::{Clock, Perception, StereoFrame};
 use crate::pipeline::Pipeline;
 use crate::simd::{self, Level};
+use crate::stage::ground::Ground;
 use crate::stamp::Stamp;
 
 /// What ends a drive early.
@@ -150,6 +151,11 @@ impl Engine {
     pub fn gray_views(&self) -> Option<[&Image<u8>; 2]> {
         let Running { pipeline, perception, .. } = self.running.as_ref()?;
         Some([&perception.left.gray, &pipeline.right().gray])
+    }
+
+    /// The ground plane of the last frame; `None` in modes that look for none.
+    pub fn ground(&self) -> Option<&Ground> {
+        self.running.as_ref()?.pipeline.ground()
     }
 
     /// Takes the result of the last frame out, so that it can be published

@@ -67,6 +67,15 @@ impl ImageMessage {
 /// Two images of one instant, not decoded yet, with their camera infos.
 pub type LivePair = Pair<ImageMessage, Arc<CameraInfo>>;
 
+/// A pair and when it was complete.
+#[derive(Debug)]
+pub struct ArrivedPair {
+    /// The pair.
+    pub pair: LivePair,
+    /// When its last message came.
+    pub at: Instant,
+}
+
 /// One topic of the input, for diagnostics.
 #[derive(Clone, Debug)]
 pub struct Topic {
@@ -132,7 +141,7 @@ impl LiveInput {
     pub fn run(
         self,
         store: &ParameterStore,
-        mailbox: &Mailbox<LivePair>,
+        mailbox: &Mailbox<ArrivedPair>,
         status: &NodeStatus,
         stop: oneshot::Receiver<()>,
     ) {
@@ -143,7 +152,7 @@ impl LiveInput {
     async fn receive(
         &self,
         store: &ParameterStore,
-        mailbox: &Mailbox<LivePair>,
+        mailbox: &Mailbox<ArrivedPair>,
         status: &NodeStatus,
         mut stop: oneshot::Receiver<()>,
     ) {
@@ -198,7 +207,7 @@ impl LiveInput {
             }
             while let Some(pair) = sync.pop() {
                 status.note_pair();
-                if mailbox.put(pair).is_some() {
+                if mailbox.put(ArrivedPair { pair, at: Instant::now() }).is_some() {
                     status.count_displaced();
                 }
             }

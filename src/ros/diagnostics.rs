@@ -12,6 +12,7 @@ pub use report::{Reporter, Surroundings};
 
 use crate::metric::Epipolar;
 use crate::perception::{Rejections, StageTimes};
+use crate::stage::ground::{GroundState, Plane};
 use crate::sync::{Counts, Settings};
 
 /// Most drop reasons that are told apart: their texts hold numbers of untrusted
@@ -56,6 +57,8 @@ pub struct NodeStatus {
     dropped: Mutex<BTreeMap<String, u64>>,
     calibration: Mutex<Option<Result<String, String>>>,
     alignment: Mutex<VecDeque<Epipolar>>,
+    ground: Mutex<Option<GroundSeen>>,
+    latency: Mutex<Latency>,
     work: Mutex<Work>,
     published: Mutex<BTreeMap<String, u64>>,
 }
@@ -73,6 +76,23 @@ pub struct Work {
     pub roi_fraction: f64,
     /// Candidates refused, summed.
     pub rejections: [u64; 6],
+}
+
+/// Whether the ground was seen in the last frame, and as which plane.
+pub type GroundSeen = (GroundState, Option<Plane>);
+
+/// How long results took since the last report, from the complete pair to the
+/// published regions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Latency {
+    /// Results in the sums.
+    pub results: u32,
+    /// Sum, milliseconds.
+    pub sum_ms: f64,
+    /// Longest one.
+    pub longest_ms: f64,
+    /// Longest share that was not spent in the stages: waiting, decoding, converting.
+    pub longest_beyond_ms: f64,
 }
 
 /// Totals since the start.
@@ -121,6 +141,8 @@ impl Default for NodeStatus {
             dropped: Mutex::default(),
             calibration: Mutex::default(),
             alignment: Mutex::default(),
+            ground: Mutex::default(),
+            latency: Mutex::default(),
             work: Mutex::default(),
             published: Mutex::default(),
         }
@@ -215,6 +237,21 @@ impl NodeStatus {
         for (sum, count) in work.rejections.iter_mut().zip(refused) {
             *sum += u64::from(count);
         }
+    }
+
+    /// The ground in the last frame; `None` when nobody looks for it.
+    pub fn note_ground(&self, seen: Option<GroundSeen>) {
+        *lock(&self.ground) = seen;
+    }
+
+    /// A result was published this long after its pair was complete, of which
+    /// the stages took `stages_ms`.
+    pub fn note_latency(&self, latency_ms: f64, stages_ms: f64) {
+        let mut latency = lock(&self.latency);
+        latency.results += 1;
+        latency.sum_ms += latency_ms;
+        latency.longest_ms = latency.longest_ms.max(latency_ms);
+        latency.longest_beyond_ms = latency.longest_beyond_ms.max(latency_ms - stages_ms);
     }
 
     /// What the input thread knows.

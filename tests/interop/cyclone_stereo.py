@@ -42,6 +42,10 @@ arguments.add_argument("--height", type=int, default=375)
 arguments.add_argument("--reliability", choices=["reliable", "best_effort"], default="reliable")
 arguments.add_argument("--namespace", default="", help="of the node, as in /robot")
 arguments.add_argument("--patience", type=float, default=20.0, help="seconds for discovery")
+arguments.add_argument("--start", type=int, default=1000, help="stamp of the first pair, seconds")
+arguments.add_argument(
+    "--listen", type=float, default=0.0, help="send nothing: listen to the regions for so long"
+)
 arguments.add_argument("--buffer", default="4MB", help="our socket receive buffer")
 options = arguments.parse_args()
 os.environ["CYCLONEDDS_URI"] = LOOPBACK.format(buffer=options.buffer)
@@ -242,7 +246,7 @@ def scene(width, height, near=48, far=12):
 
 
 def header(number):
-    return Header(Time(1000 + number // 10, number % 10 * 100_000_000), "left_optical")
+    return Header(Time(options.start + number // 10, number % 10 * 100_000_000), "left_optical")
 
 
 def camera_info(number, tx):
@@ -268,6 +272,24 @@ def image(number, payload):
     return message
 
 
+def taken(reader):
+    """Messages; a writer that leaves makes samples without one."""
+    return [message for message in reader.take(N=100) if hasattr(message, "header")]
+
+
+def listen(regions):
+    """As a viewer that comes late: every array after the first that it gets."""
+    stamps = []
+    until = time.monotonic() + options.listen
+    while time.monotonic() < until:
+        for array in taken(regions):
+            stamps.append(array.header.stamp.sec * 10 + array.header.stamp.nanosec // 100_000_000)
+        time.sleep(0.01)
+    gaps = sum(b - a - 1 for a, b in zip(stamps, stamps[1:]))
+    print(json.dumps({"arrays": len(stamps), "gaps": gaps}))
+    return 0 if stamps and gaps == 0 else 3
+
+
 def main():
     reliability = (
         Policy.Reliability.Reliable(duration(milliseconds=100))
@@ -287,13 +309,15 @@ def main():
     def writer(relative, kind):
         return DataWriter(participant, Topic(participant, name(relative), kind, qos=out_qos))
 
+    regions = DataReader(
+        participant, Topic(participant, name("regions"), SalientRegionArray, qos=in_qos)
+    )
+    if options.listen:
+        return listen(regions)
     left, right = writer("left/image_rect", Image), writer("right/image_rect", Image)
     left_info, right_info = (
         writer("left/camera_info", CameraInfo),
         writer("right/camera_info", CameraInfo),
-    )
-    regions = DataReader(
-        participant, Topic(participant, name("regions"), SalientRegionArray, qos=in_qos)
     )
     diagnostics = DataReader(
         participant, Topic(participant, "rt/diagnostics", DiagnosticArray, qos=in_qos)
@@ -314,11 +338,11 @@ def main():
     sent_at, arrived, found, counters = {}, {}, [], {}
 
     def collect():
-        for array in regions.take(N=100):
+        for array in taken(regions):
             stamp = (array.header.stamp.sec, array.header.stamp.nanosec)
             arrived.setdefault(stamp, []).append(time.monotonic())
             found.append(len(array.regions))
-        for message in diagnostics.take(N=100):
+        for message in taken(diagnostics):
             for status in message.status:
                 counters.update({v.key: v.value for v in status.values})
 
@@ -364,6 +388,13 @@ def main():
                 "regions_per_array": round(sum(found) / max(len(found), 1), 2),
                 "latency_ms_p50": percentile(0.5),
                 "latency_ms_p95": percentile(0.95),
+                "latency_ms_p99": percentile(0.99),
+                "stages_ms": counters.get("total (ms)"),
+                "latency_inside_ms": counters.get("latency from pair to regions (ms)"),
+                "longest_beyond_stages_ms": counters.get("longest latency beyond the stages (ms)"),
+                "last_answered": all(
+                    stamp in arrived for stamp in list(sent_at)[-min(5, len(sent_at)) :]
+                ),
                 "node_receive_buffer": counter("receive buffer (bytes)"),
                 "datagrams_lost": counter(
                     "datagrams lost to full receive buffers on this machine (RcvbufErrors)"

@@ -65,8 +65,8 @@ pub fn examine_graph(
         let mut frames = FrameBuilder::default();
         let deadline = Instant::now() + Duration::from_secs_f64(seconds);
         while Instant::now() < deadline && !stop.load(Ordering::Relaxed) {
-            let Taken::Item(pair) = pairs.take(Duration::from_millis(50)) else { continue };
-            match frames.frame(&pair, patient.config.calibration.baseline_override) {
+            let Taken::Item(arrived) = pairs.take(Duration::from_millis(50)) else { continue };
+            match frames.frame(&arrived.pair, patient.config.calibration.baseline_override) {
                 Ok(frame) => check.take(&frame),
                 Err(error) => tally.skip(error.to_string()),
             }

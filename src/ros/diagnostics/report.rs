@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::time::Instant;
 
-use super::{NodeStatus, Totals, Work, lock};
+use super::{GroundSeen, NodeStatus, Totals, Work, lock};
 use crate::config::Config;
 use crate::metric::{Epipolar, MISALIGNED_PX};
 use crate::perception::Stage;
@@ -203,6 +203,17 @@ impl Reporter {
         processing.value("frames", totals.processed);
         processing.value("frame rate (Hz)", rate(totals.processed, before.processed));
         processing.value("regions", totals.regions);
+        let latency = std::mem::take(&mut *lock(&status.latency));
+        if latency.results > 0 {
+            let mean = latency.sum_ms / f64::from(latency.results);
+            processing.value("latency from pair to regions (ms)", format_args!("{mean:.2}"));
+            processing.value("longest latency (ms)", format_args!("{:.2}", latency.longest_ms));
+            processing.value(
+                "longest latency beyond the stages (ms)",
+                format_args!("{:.2}", latency.longest_beyond_ms),
+            );
+        }
+        processing.value("ground", ground(lock(&status.ground).as_ref()));
 
         // Transport.
         let mut transport = Draft::new();
@@ -286,6 +297,16 @@ fn alignment(found: &Epipolar, rectify: bool, draft: &mut Draft) {
     }
 }
 
+fn ground(seen: Option<&GroundSeen>) -> String {
+    match seen {
+        None => "not looked for".to_owned(),
+        Some((state, None)) => state.name().to_owned(),
+        Some((state, Some(plane))) => {
+            format!("{}, camera {:.2} m above it", state.name(), plane.camera_height_m)
+        }
+    }
+}
+
 fn processing(work: &Work) -> Draft {
     let mut draft = Draft::new();
     if work.frames == 0 {
@@ -316,6 +337,7 @@ fn processing(work: &Work) -> Draft {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stage::ground::{GroundState, Plane};
 
     fn status<'a>(message: &'a DiagnosticArray, name: &str) -> &'a DiagnosticStatus {
         message.status.iter().find(|s| s.name.ends_with(name)).unwrap()
@@ -398,6 +420,32 @@ mod tests {
         let (level, message) = level();
         assert_eq!(level, DiagnosticStatus::WARN);
         assert!(message.contains("1.4 px apart (median of 30 points)"), "{message}");
+    }
+
+    #[test]
+    fn latency_and_ground_are_told_of_the_last_second() {
+        let node_status = NodeStatus::default();
+        let mut reporter = Reporter::new("n");
+        let mut values = || {
+            let around = Surroundings::default();
+            let message = reporter.report(Stamp(1), &node_status, &Config::default(), &around);
+            let values = status(&message, "Processing").values.clone();
+            move |key: &str| values.iter().find(|v| v.key == key).map(|v| v.value.clone())
+        };
+        node_status.note_latency(10.0, 8.0);
+        node_status.note_latency(20.0, 19.5);
+        let first = values();
+        assert_eq!(first("latency from pair to regions (ms)").unwrap(), "15.00");
+        assert_eq!(first("longest latency (ms)").unwrap(), "20.00");
+        assert_eq!(first("longest latency beyond the stages (ms)").unwrap(), "2.00");
+        assert_eq!(first("ground").unwrap(), "not looked for");
+        let plane = Plane { a: 0.1, b: 0.0, c: 0.0, camera_height_m: 1.65, distance_m: 12.0 };
+        node_status.note_ground(Some((GroundState::Measured, Some(plane))));
+        let second = values();
+        assert_eq!(second("latency from pair to regions (ms)"), None);
+        assert_eq!(second("ground").unwrap(), "plane, camera 1.65 m above it");
+        node_status.note_ground(Some((GroundState::None, None)));
+        assert_eq!(values()("ground").unwrap(), "no plane");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::Observer;
 use super::align::Sampler;
 use crate::drive::Engine;
 use crate::input::Observation;
-use crate::input::live::{FrameBuilder, FrameError, LivePair, Topic};
+use crate::input::live::{ArrivedPair, FrameBuilder, FrameError, Topic};
 use crate::mailbox::{Mailbox, Taken};
 use crate::output::live::LiveOutput;
 use crate::perception::Perception;
@@ -22,6 +22,7 @@ use crate::ros::time::NodeClock;
 pub(super) struct Outcome {
     observation: Observation,
     perception: Perception,
+    arrived: Instant,
 }
 
 /// Emptied results whose buffers are used again.
@@ -32,7 +33,7 @@ pub(super) struct Worker {
     pub store: Arc<ParameterStore>,
     pub status: Arc<NodeStatus>,
     pub resets: Arc<AtomicU64>,
-    pub pairs: Arc<Mailbox<LivePair>>,
+    pub pairs: Arc<Mailbox<ArrivedPair>>,
     pub results: Arc<Mailbox<Outcome>>,
     pub spares: Spares,
     pub grays: Sampler,
@@ -47,8 +48,8 @@ impl Worker {
         let mut engine = Engine::new((*config).clone());
         let mut frames = FrameBuilder::default();
         loop {
-            let pair = match self.pairs.take(Duration::from_secs(1)) {
-                Taken::Item(pair) => pair,
+            let ArrivedPair { pair, at: arrived } = match self.pairs.take(Duration::from_secs(1)) {
+                Taken::Item(arrived) => arrived,
                 Taken::Nothing => continue,
                 Taken::Closed => break,
             };
@@ -92,10 +93,13 @@ impl Worker {
                 continue;
             }
             self.grays.take(&engine, &config);
+            self.status.note_ground(
+                engine.ground().map(|ground| (ground.state(), ground.plane().copied())),
+            );
             let spare = self.spares.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let Some(perception) = engine.exchange(spare) else { continue };
             let observation = Observation { frame, truth: None };
-            if let Some(old) = self.results.put(Outcome { observation, perception }) {
+            if let Some(old) = self.results.put(Outcome { observation, perception, arrived }) {
                 self.status.count_output_displaced();
                 give_back(&self.spares, old.perception);
             }
@@ -163,8 +167,10 @@ impl OutputThread {
         let mut due = Instant::now() + PERIOD;
         loop {
             match self.results.take(due.saturating_duration_since(Instant::now())) {
-                Taken::Item(Outcome { observation, perception }) => {
+                Taken::Item(Outcome { observation, perception, arrived }) => {
                     self.output.publish(&perception, &self.store.config());
+                    let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
+                    self.status.note_latency(latency_ms, perception.times.total());
                     if let Some(observer) = &mut self.observer {
                         observer(&observation, &perception);
                     }
