@@ -25,6 +25,8 @@ const LEAST_CONTACT: f32 = 0.2;
 const TRIM: f32 = 0.04;
 /// Cells beside a thing in which its background is looked for.
 const LOOK_ASIDE: usize = 3;
+/// Cells across a pole, at most.
+const MOST_WIDE: usize = 3;
 /// Share of a thing's sides that must be free of anything nearer.
 const LEAST_FREE: f32 = 0.3;
 
@@ -48,6 +50,8 @@ pub struct Thing {
     /// Cells at its sides with something farther and something nearer beyond.
     free: u32,
     hidden: u32,
+    /// As narrow as a trunk or a pole.
+    narrow: bool,
 }
 
 /// The things of a frame and where they are.
@@ -148,7 +152,7 @@ impl Standing {
             let behind = (thing.free as f32) < LEAST_FREE * sides;
             out.floating += u32::from(large && !stands);
             if large && stands && !building && !behind {
-                out.list[kept] = thing;
+                out.list[kept] = Thing { narrow, ..thing };
                 kept += 1;
                 self.seen.push(kept as u32);
             } else {
@@ -207,6 +211,16 @@ impl Standing {
                 out.ids.set(s.x as usize, y as usize, thing);
                 out.surface.set(s.x as usize, y as usize, s.disparity());
             }
+            // A pole is seen up to its end, a trunk up to its crown.
+            if out.list[index].narrow && s.top == Top::Tall {
+                for y in (s.reach..s.upper.min(bottom)).rev() {
+                    if width(disparity, s, y) > MOST_WIDE {
+                        break;
+                    }
+                    out.ids.set(s.x as usize, y as usize, thing);
+                    out.surface.set(s.x as usize, y as usize, s.disparity());
+                }
+            }
         }
     }
 }
@@ -233,4 +247,14 @@ fn sides(disparity: &Image<f32>, s: &Segment) -> [u32; 2] {
         }
     }
     counts
+}
+
+/// Columns of cells around a segment that have its disparity in row `y`, no
+/// more than one beyond the limit.
+fn width(disparity: &Image<f32>, s: &Segment, y: u32) -> usize {
+    let (row, x, d) = (disparity.row(y as usize), s.x as usize, s.disparity());
+    let same = |d2: &&f32| agree(**d2, d);
+    let left = row[..x].iter().rev().take(MOST_WIDE).take_while(same).count();
+    let right = row[x + 1..].iter().take(MOST_WIDE).take_while(same).count();
+    left + 1 + right
 }

@@ -16,6 +16,8 @@ const LEAST_SAMPLES: usize = 3;
 const LEAST_SALIENT: f32 = 0.3;
 /// Largest difference of a pixel from its surface in parts of the disparity.
 const SURFACE_PART: f32 = 0.1;
+const SURFACE_PX: f32 = 0.7;
+const GROUND_PX: f32 = 0.3;
 
 /// The former of such regions, with its buffers.
 #[derive(Debug, Default)]
@@ -41,7 +43,7 @@ impl Upright {
         let least_cells = (min_area / (CELL * CELL)).max(1) as u32;
         self.standing.run(&self.cells, plane, source.rig, least_cells, &mut self.things);
         let count = self.choose(&source.roi.salient);
-        self.paint(source.disparity, out);
+        self.paint(plane, source, out);
         out.measure_boxes(count);
         self.things.floating
     }
@@ -108,7 +110,8 @@ impl Upright {
 
     /// From cells to pixels: those of a thing's cells that do not contradict
     /// its surface, and those of the cells beside and above that agree with it.
-    fn paint(&mut self, disparity: &Image<f32>, out: &mut Candidates) {
+    fn paint(&mut self, plane: &Plane, source: &RegionSource<'_>, out: &mut Candidates) {
+        let disparity = source.disparity;
         let size = disparity.size();
         out.ids.resize(size);
         out.ids.fill(0);
@@ -120,6 +123,8 @@ impl Upright {
         for cy in 0..ids.height() {
             for cx in 0..ids.width() {
                 let own = number(cx, cy);
+                let interior = (cx == 0 || number(cx - 1, cy) == own)
+                    && (cx + 1 == ids.width() || number(cx + 1, cy) == own);
                 let (id, surface) = if own != 0 {
                     (own, surface.get(cx, cy))
                 } else {
@@ -135,13 +140,18 @@ impl Upright {
                 };
                 for y in cy * CELL..(cy * CELL + CELL).min(size.height) {
                     let columns = cx * CELL..(cx * CELL + CELL).min(size.width);
+                    // What does not rise above the ground is none of the thing.
+                    let ground = plane.disparity((cx * CELL) as f32 + 1.5, y as f32) + GROUND_PX;
                     let d = &disparity.row(y)[columns.clone()];
+                    let unmatched = source.roi.matched.row(y)[columns.start] == 0;
                     for (out, &d) in out.ids.row_mut(y)[columns].iter_mut().zip(d) {
                         let inside = if own == 0 {
-                            agree(d, surface)
+                            agree(d, surface) && d > ground
                         } else {
                             // NaN does not contradict.
-                            d.is_nan() || (d - surface).abs() <= (SURFACE_PART * surface).max(1.0)
+                            d.is_nan() && (interior || unmatched)
+                                || ((d - surface).abs() <= (SURFACE_PART * surface).max(SURFACE_PX)
+                                    && d > ground)
                         };
                         if inside {
                             *out = id;

@@ -125,8 +125,13 @@ impl Columns {
                     continue;
                 }
                 let mut s = *s;
-                if s.top != Top::Tall && gap <= LOOK_UP && d > s.last && !agree(d, s.last) {
-                    s.top = Top::Covered;
+                if s.top != Top::Tall && gap <= LOOK_UP && !agree(d, s.last) {
+                    // Nothing ends at this height by chance: a step in a wall.
+                    if height > HIGH_M && s.reach == s.upper && s.upper == y as u32 + 1 {
+                        s.top = Top::Tall;
+                    } else if d > s.last {
+                        s.top = Top::Covered;
+                    }
                 }
                 carried = gap <= MAX_HOLES && d < s.disparity();
                 self.segments.push(s);

@@ -48,6 +48,10 @@ impl Box2 {
 /// Standard deviation of the centroid of one and the same object from frame to
 /// frame, in parts of its extent: a region never covers exactly the same pixels.
 const SEGMENTATION: f64 = 0.1;
+/// Frames for which a track is predicted, and its longest time unseen in parts
+/// of the time it was seen.
+const LONGEST_COAST: u32 = 3;
+const SEEN_PART: f64 = 0.5;
 
 /// Covariance of a region's position as a measurement of its object's position.
 fn noise(region: &Region) -> [f64; 9] {
@@ -158,7 +162,8 @@ impl Follow {
     /// True while its prediction is worth publishing: a track coasts no longer
     /// than it was seen.
     pub fn is_predictable(&self, stamp: Stamp) -> bool {
-        self.unseen_for(stamp) <= self.last_seen.seconds_since(self.born)
+        let seen = self.last_seen.seconds_since(self.born);
+        self.unseen_for(stamp) <= SEEN_PART * seen && self.history.trailing_zeros() <= LONGEST_COAST
     }
 
     /// True for a track that was never believed and can no longer become so
