@@ -15,7 +15,7 @@ use follow::{Box2, Follow};
 const GATE: f64 = 16.27;
 /// Where boxes overlap too little, positions may continue a track up to this
 /// many times the larger lateral extent of the object.
-const REACH: f64 = 1.5;
+const REACH: f64 = 1.0;
 /// Largest ratio of the boxes' areas in that case.
 const MAX_GROWTH: f32 = 2.0;
 /// A longer time between two frames in seconds is another recording.

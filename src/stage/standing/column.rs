@@ -127,7 +127,10 @@ impl Columns {
                 let mut s = *s;
                 if s.top != Top::Tall && gap <= LOOK_UP && !agree(d, s.last) {
                     // Nothing ends at this height by chance: a step in a wall.
-                    if height > HIGH_M && s.reach == s.upper && s.upper == y as u32 + 1 {
+                    if plane.height(u, v, s.last) > HIGH_M
+                        && s.reach == s.upper
+                        && s.upper == y as u32 + 1
+                    {
                         s.top = Top::Tall;
                     } else if d > s.last {
                         s.top = Top::Covered;

@@ -47,7 +47,7 @@ impl Box2 {
 
 /// Standard deviation of the centroid of one and the same object from frame to
 /// frame, in parts of its extent: a region never covers exactly the same pixels.
-const SEGMENTATION: f64 = 0.1;
+const SEGMENTATION: f64 = 0.25;
 /// Frames for which a track is predicted, and its longest time unseen in parts
 /// of the time it was seen.
 const LONGEST_COAST: u32 = 3;
