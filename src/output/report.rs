@@ -107,7 +107,7 @@ struct Totals {
     frames: u64,
     regions: u64,
     roi_fraction: f64,
-    rejections: [u64; 6],
+    rejections: [u64; 8],
     size: Option<Size>,
     first: Stamp,
     last: Stamp,
@@ -130,11 +130,21 @@ impl Totals {
             low_confidence,
             inconsistent_depth,
             floating,
+            background,
+            not_salient,
             unstable,
             over_count,
         } = perception.rejections;
-        let reasons =
-            [small_area, low_confidence, inconsistent_depth, floating, unstable, over_count];
+        let reasons = [
+            small_area,
+            low_confidence,
+            inconsistent_depth,
+            floating,
+            background,
+            not_salient,
+            unstable,
+            over_count,
+        ];
         for (sum, count) in self.rejections.iter_mut().zip(reasons) {
             *sum += u64::from(count);
         }

@@ -165,6 +165,11 @@ pub struct Rejections {
     pub inconsistent_depth: u32,
     /// Large enough, but nothing carries it: the crown of a tree, a bridge.
     pub floating: u32,
+    /// Goes on above a lorry's height, or shows only between nearer things: a
+    /// house front.
+    pub background: u32,
+    /// Stands there, but the attention map passes over it.
+    pub not_salient: u32,
     /// Seen in too few of the last frames.
     pub unstable: u32,
     /// Beyond `regions.max_count`.
@@ -178,6 +183,8 @@ impl Rejections {
             + self.low_confidence
             + self.inconsistent_depth
             + self.floating
+            + self.background
+            + self.not_salient
             + self.unstable
             + self.over_count
     }
@@ -188,6 +195,9 @@ impl std::ops::AddAssign for Rejections {
         self.small_area += other.small_area;
         self.low_confidence += other.low_confidence;
         self.inconsistent_depth += other.inconsistent_depth;
+        self.floating += other.floating;
+        self.background += other.background;
+        self.not_salient += other.not_salient;
         self.unstable += other.unstable;
         self.over_count += other.over_count;
     }

@@ -75,7 +75,7 @@ pub struct Work {
     /// Sum of the shares of the image that were matched.
     pub roi_fraction: f64,
     /// Candidates refused, summed.
-    pub rejections: [u64; 6],
+    pub rejections: [u64; 8],
 }
 
 /// Whether the ground was seen in the last frame, and as which plane.
@@ -231,6 +231,8 @@ impl NodeStatus {
             rejections.low_confidence,
             rejections.inconsistent_depth,
             rejections.floating,
+            rejections.background,
+            rejections.not_salient,
             rejections.unstable,
             rejections.over_count,
         ];

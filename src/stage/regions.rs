@@ -92,8 +92,8 @@ impl Regions {
         regions.clear();
         *rejections = Rejections::default();
         if let Some(plane) = source.plane {
-            rejections.floating =
-                self.upright.run(plane, source, self.min_area, &mut self.candidates);
+            let area = self.min_area;
+            self.upright.run(plane, source, area, &mut self.candidates, rejections);
         } else {
             self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
         }

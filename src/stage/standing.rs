@@ -65,6 +65,9 @@ pub struct Things {
     pub list: Vec<Thing>,
     /// Candidates that do not reach the ground.
     pub floating: u32,
+    /// Candidates that go on above a lorry's height, or have only nearer things
+    /// at their sides.
+    pub background: u32,
 }
 
 /// The finder of things that stand, with its buffers.
@@ -108,6 +111,7 @@ impl Standing {
         let cx = rig.principal_point().0 as f32;
         out.list.clear();
         out.floating = 0;
+        out.background = 0;
         self.thing.clear();
         for (i, s) in self.columns.segments.iter().enumerate() {
             let root = self.join.set_of(i as u32) as usize;
@@ -151,6 +155,7 @@ impl Standing {
             let sides = (thing.free + thing.hidden).max(1) as f32;
             let behind = (thing.free as f32) < LEAST_FREE * sides;
             out.floating += u32::from(large && !stands);
+            out.background += u32::from(large && stands && (building || behind));
             if large && stands && !building && !behind {
                 out.list[kept] = Thing { narrow, ..thing };
                 kept += 1;

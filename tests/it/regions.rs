@@ -442,6 +442,8 @@ fn each_refusal_has_its_reason() {
         low_confidence: 2,
         inconsistent_depth: 1,
         floating: 0,
+        background: 0,
+        not_salient: 0,
         unstable: 0,
         over_count: 1,
     };

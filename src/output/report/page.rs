@@ -207,6 +207,8 @@ fn counters(report: &ReportSink) -> String {
         "low confidence or too few matches",
         "inconsistent depth",
         "not standing on the ground",
+        "part of a house front, or only seen between nearer things",
+        "not salient",
         "seen in too few frames",
         "beyond regions.max_count",
     ];

@@ -325,6 +325,8 @@ fn processing(work: &Work) -> Draft {
         "low confidence",
         "inconsistent depth",
         "not standing on the ground",
+        "background",
+        "not salient",
         "unstable",
         "over count",
     ];

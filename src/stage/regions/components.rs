@@ -15,7 +15,13 @@ const PENDING: u32 = u32::MAX;
 /// |a − b| <= max(0.7 px, 5 % of the larger one). False for NaN.
 #[inline]
 pub fn agree(a: f32, b: f32) -> bool {
-    (a - b).abs() <= TOLERANCE_PX.max(TOLERANCE_PART * a.max(b))
+    (a - b).abs() <= tolerance(a.max(b))
+}
+
+/// By how much disparities of one object may differ from `disparity`, the larger one.
+#[inline]
+pub fn tolerance(disparity: f32) -> f32 {
+    TOLERANCE_PX.max(TOLERANCE_PART * disparity)
 }
 
 /// A box of pixels and how many of them belong to a candidate.
@@ -57,8 +63,40 @@ pub struct Candidates {
 }
 
 impl Candidates {
+    /// No pixel belongs to any of `count` candidates.
+    pub fn clear(&mut self, size: Size, count: usize) {
+        if self.ids.size() == size {
+            // What is set lies in the boxes.
+            for b in self.boxes.iter().filter(|b| b.area > 0) {
+                for y in b.y0..b.y1 {
+                    self.ids.row_mut(y)[b.x0..b.x1].fill(0);
+                }
+            }
+        } else {
+            self.ids.resize(size);
+            self.ids.fill(0);
+        }
+        self.boxes.clear();
+        self.boxes.resize(count, PixelBox::NONE);
+    }
+
+    /// Gives those pixels of row `y` from column `x` on to candidate `id` for
+    /// which `inside` says so.
+    pub fn mark(&mut self, id: u32, x: usize, y: usize, inside: impl Iterator<Item = bool>) {
+        let b = &mut self.boxes[id as usize - 1];
+        let row = self.ids.row_mut(y)[x..].iter_mut();
+        for (x, (pixel, _)) in (x..).zip(row.zip(inside)).filter(|(_, (_, inside))| *inside) {
+            *pixel = id;
+            b.x0 = b.x0.min(x);
+            b.x1 = b.x1.max(x + 1);
+            b.y0 = b.y0.min(y);
+            b.y1 = b.y1.max(y + 1);
+            b.area += 1;
+        }
+    }
+
     /// Numbers the boxes again from `ids`, of which there are `count`.
-    pub fn measure_boxes(&mut self, count: usize) {
+    fn measure_boxes(&mut self, count: usize) {
         self.boxes.clear();
         self.boxes.resize(count, PixelBox::NONE);
         let width = self.ids.width();

@@ -14,6 +14,8 @@ const SYSTEMATIC_PX: f64 = 0.15;
 const BOUNDARY_PX: f64 = 0.5;
 /// Neighbouring pixels share their matching window: this many count as one.
 const PIXELS_PER_SAMPLE: f64 = 25.0;
+/// Values of which percentiles are taken.
+const MOST_VALUES: usize = 4096;
 /// Robust standard deviations within which a disparity counts for the centroid.
 const INLIER_SIGMAS: f32 = 3.0;
 
@@ -99,6 +101,8 @@ impl Measure {
         let (mean, deviation) = mean_and_deviation(depth, depth_squares, self.depths.len() as f64);
         (region.mean_depth, region.depth_stddev) = (mean as f32, deviation as f32);
 
+        thin(&mut self.depths);
+        thin(&mut self.disparities);
         let [near, median, far] = percentiles(&mut self.depths, [0.05, 0.5, 0.95]);
         (region.near_depth, region.median_depth, region.far_depth) = (near, median, far);
         let [low, middle, high] = percentiles(&mut self.disparities, [0.16, 0.5, 0.84]);
@@ -139,9 +143,13 @@ fn locate(
     let mut n = 0.0_f64;
     let (mut position, mut sum, mut squares) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3]);
     for y in bounds.y0..bounds.y1 {
-        for x in bounds.x0..bounds.x1 {
-            let (d, z) = (source.disparity.get(x, y), source.depth.get(x, y));
-            if ids.get(x, y) != id || !z.is_finite() || (d - median).abs() > tolerance {
+        let columns = bounds.x0..bounds.x1;
+        let row = ids.row(y)[columns.clone()]
+            .iter()
+            .zip(&source.disparity.row(y)[columns.clone()])
+            .zip(&source.depth.row(y)[columns.clone()]);
+        for (x, ((&at, &d), &z)) in columns.zip(row) {
+            if at != id || !z.is_finite() || (d - median).abs() > tolerance {
                 continue;
             }
             let pixel = [x as f64, y as f64, f64::from(d)];
@@ -213,6 +221,15 @@ fn mean_and_deviation(sum: f64, squares: f64, n: f64) -> (f64, f64) {
     let variance = squares / n - mean * mean;
     // `max` would turn NaN into 0.
     (mean, if variance < 0.0 { 0.0 } else { variance.sqrt() })
+}
+
+/// Keeps every n-th value of many: percentiles need no more.
+fn thin(values: &mut Vec<f32>) {
+    let step = values.len().div_ceil(MOST_VALUES).max(1);
+    for (to, from) in (0..values.len()).step_by(step).enumerate() {
+        values[to] = values[from];
+    }
+    values.truncate(values.len().div_ceil(step));
 }
 
 /// Three ascending percentiles, each interpolated between its two neighbours;

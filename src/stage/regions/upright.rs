@@ -1,8 +1,9 @@
 //! Regions of things that stand on the ground, from the fine disparity.
 
 use super::RegionSource;
-use super::components::{Candidates, agree};
+use super::components::{Candidates, tolerance};
 use crate::image::Image;
+use crate::perception::Rejections;
 use crate::stage::coarse::CELL;
 use crate::stage::ground::Plane;
 use crate::stage::standing::{Standing, Things};
@@ -30,22 +31,24 @@ pub struct Upright {
 }
 
 impl Upright {
-    /// Candidates for regions on `plane`; returns how many things of at least
-    /// `min_area` pixels do not reach the ground.
+    /// Candidates for regions on `plane`, of things of at least `min_area`
+    /// pixels; those that are refused here are counted.
     pub fn run(
         &mut self,
         plane: &Plane,
         source: &RegionSource<'_>,
         min_area: usize,
         out: &mut Candidates,
-    ) -> u32 {
+        rejections: &mut Rejections,
+    ) {
         self.shrink(source);
         let least_cells = (min_area / (CELL * CELL)).max(1) as u32;
         self.standing.run(&self.cells, plane, source.rig, least_cells, &mut self.things);
         let count = self.choose(&source.roi.salient);
-        self.paint(plane, source, out);
-        out.measure_boxes(count);
-        self.things.floating
+        self.paint(plane, source, count, out);
+        rejections.floating = self.things.floating;
+        rejections.background = self.things.background;
+        rejections.not_salient = (self.things.list.len() - count) as u32;
     }
 
     /// The median disparity of each cell inside the region of interest.
@@ -54,31 +57,20 @@ impl Upright {
         self.cells.resize(size.divided_by(CELL));
         let offset = source.rig.disparity_offset() as f32;
         for cy in 0..self.cells.height() {
-            for cx in 0..self.cells.width() {
-                let (x0, y0) = (cx * CELL, cy * CELL);
-                let mut sorted = [f32::INFINITY; SAMPLES.len()];
-                let mut n = 0;
-                for (dx, dy) in SAMPLES {
-                    let (x, y) = (x0 + dx, y0 + dy);
-                    if x >= size.width || y >= size.height {
-                        continue;
-                    }
-                    let d = source.disparity.get(x, y);
-                    if d.is_nan() {
-                        continue;
-                    }
-                    let mut at = n;
-                    while at > 0 && sorted[at - 1] > d {
-                        sorted[at] = sorted[at - 1];
-                        at -= 1;
-                    }
-                    sorted[at] = d;
-                    n += 1;
-                }
+            // Rows and columns of the cell inside the image, and whether any is matched.
+            let rows: [usize; CELL] = std::array::from_fn(|i| (cy * CELL + i).min(size.height - 1));
+            let matched = [rows[0], rows[CELL - 1]].map(|y| source.roi.matched.row(y));
+            let disparity = rows.map(|y| source.disparity.row(y));
+            let coarse = source.coarse.checked.row(cy);
+            for (cx, out) in self.cells.row_mut(cy).iter_mut().enumerate() {
+                let from = cx * CELL;
+                let last = (from + CELL - 1).min(size.width - 1);
+                let any = matched.iter().any(|row| row[from] != 0 || row[last] != 0);
                 // What was not matched finely is known coarsely.
-                let coarse = || source.coarse.checked.get(cx, cy) - offset;
-                let median = if n < LEAST_SAMPLES { coarse() } else { sorted[n / 2] };
-                self.cells.set(cx, cy, median);
+                *out = if any { median(&disparity, from, last) } else { f32::NAN };
+                if out.is_nan() {
+                    *out = coarse[cx] - offset;
+                }
             }
         }
     }
@@ -105,60 +97,79 @@ impl Upright {
             count += u32::from(chosen);
             *number = if chosen { count } else { 0 };
         }
+        for id in self.things.ids.pixels_mut().iter_mut().filter(|id| **id != 0) {
+            *id = self.number[*id as usize - 1];
+        }
         count as usize
     }
 
     /// From cells to pixels: those of a thing's cells that do not contradict
     /// its surface, and those of the cells beside and above that agree with it.
-    fn paint(&mut self, plane: &Plane, source: &RegionSource<'_>, out: &mut Candidates) {
-        let disparity = source.disparity;
-        let size = disparity.size();
-        out.ids.resize(size);
-        out.ids.fill(0);
+    fn paint(
+        &mut self,
+        plane: &Plane,
+        source: &RegionSource<'_>,
+        count: usize,
+        out: &mut Candidates,
+    ) {
+        let size = source.disparity.size();
+        out.clear(size, count);
         let (ids, surface) = (&self.things.ids, &self.things.surface);
-        let number = |cx: usize, cy: usize| match ids.get(cx, cy) {
-            0 => 0,
-            id => self.number[id as usize - 1],
-        };
         for cy in 0..ids.height() {
-            for cx in 0..ids.width() {
-                let own = number(cx, cy);
-                let interior = (cx == 0 || number(cx - 1, cy) == own)
-                    && (cx + 1 == ids.width() || number(cx + 1, cy) == own);
-                let (id, surface) = if own != 0 {
-                    (own, surface.get(cx, cy))
-                } else {
-                    let left = if cx > 0 { number(cx - 1, cy) } else { 0 };
-                    let right = if cx + 1 < ids.width() { number(cx + 1, cy) } else { 0 };
-                    let below = if cy + 1 < ids.height() { number(cx, cy + 1) } else { 0 };
-                    match (left, right, below) {
-                        (0, 0, 0) => continue,
-                        (0, 0, id) => (id, surface.get(cx, cy + 1)),
-                        (0, id, _) => (id, surface.get(cx + 1, cy)),
-                        (id, _, _) => (id, surface.get(cx - 1, cy)),
-                    }
+            let (row, surfaces) = (ids.row(cy), surface.row(cy));
+            let below = if cy + 1 < ids.height() { ids.row(cy + 1) } else { &[] };
+            for cx in 0..row.len() {
+                let left = if cx > 0 { row[cx - 1] } else { 0 };
+                let right = row.get(cx + 1).copied().unwrap_or(0);
+                let low = below.get(cx).copied().unwrap_or(0);
+                let (id, surface) = match (row[cx], left, right, low) {
+                    (0, 0, 0, 0) => continue,
+                    (0, 0, 0, id) => (id, surface.get(cx, cy + 1)),
+                    (0, 0, id, _) => (id, surfaces[cx + 1]),
+                    (0, id, _, _) => (id, surfaces[cx - 1]),
+                    (own, ..) => (own, surfaces[cx]),
                 };
+                let own = row[cx] != 0;
+                // What only one camera sees at the sides of a thing belongs to
+                // what is behind it.
+                let interior =
+                    own && (cx == 0 || left == id) && (cx + 1 == row.len() || right == id);
+                let tolerance =
+                    if own { (SURFACE_PART * surface).max(SURFACE_PX) } else { tolerance(surface) };
+                let columns = cx * CELL..(cx * CELL + CELL).min(size.width);
                 for y in cy * CELL..(cy * CELL + CELL).min(size.height) {
-                    let columns = cx * CELL..(cx * CELL + CELL).min(size.width);
                     // What does not rise above the ground is none of the thing.
-                    let ground = plane.disparity((cx * CELL) as f32 + 1.5, y as f32) + GROUND_PX;
-                    let d = &disparity.row(y)[columns.clone()];
-                    let unmatched = source.roi.matched.row(y)[columns.start] == 0;
-                    for (out, &d) in out.ids.row_mut(y)[columns].iter_mut().zip(d) {
-                        let inside = if own == 0 {
-                            agree(d, surface) && d > ground
-                        } else {
-                            // NaN does not contradict.
-                            d.is_nan() && (interior || unmatched)
-                                || ((d - surface).abs() <= (SURFACE_PART * surface).max(SURFACE_PX)
-                                    && d > ground)
-                        };
-                        if inside {
-                            *out = id;
-                        }
-                    }
+                    let ground = plane.disparity(columns.start as f32 + 1.5, y as f32) + GROUND_PX;
+                    let unmatched = own && source.roi.matched.row(y)[columns.start] == 0;
+                    let fill = interior || unmatched;
+                    let d = &source.disparity.row(y)[columns.clone()];
+                    let inside = |d: f32| {
+                        (d.is_nan() && fill) || ((d - surface).abs() <= tolerance && d > ground)
+                    };
+                    out.mark(id, columns.start, y, d.iter().map(|&d| inside(d)));
                 }
             }
         }
     }
+}
+
+/// Median disparity of some of the pixels of a cell, whose rows are given, from
+/// column `from` to column `last`; NaN with too few.
+fn median(rows: &[&[f32]; CELL], from: usize, last: usize) -> f32 {
+    let mut sorted = [f32::INFINITY; SAMPLES.len()];
+    let mut n = 0;
+    for (dx, dy) in SAMPLES {
+        let d = rows[dy][(from + dx).min(last)];
+        if d.is_nan() {
+            continue;
+        }
+        let mut at = n;
+        while at > 0 && sorted[at - 1] > d {
+            sorted[at] = sorted[at - 1];
+            at -= 1;
+        }
+        sorted[at] = d;
+        n += 1;
+    }
+    if n < LEAST_SAMPLES { f32::NAN } else { sorted[n / 2] }
 }
