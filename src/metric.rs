@@ -23,6 +23,7 @@
 //! | J, F, recall, decay | IoU; F of outlines within 0.8 % of the diagonal; share above ½; first less last quarter | DAVIS 2016 |
 //! | warped IoU | IoU of a mask with the one before, moved along the flow | |
 //! | region precision, recall, F1 | one-to-one matching at IoU ≥ τ | PASCAL VOC |
+//! | calibration error | mean of \|stated probability − share that was right\| over ten bins | Naeini et al. 2015 |
 //! | epipolar error | median vertical distance of a corner from its partner, px | |
 //! | ID switches | a true object continues under another track | CLEAR MOT 2008 |
 //!
@@ -32,6 +33,7 @@
 //! The measures of maps are those of `pysodmetrics`, on maps as they are and,
 //! as it does, on maps stretched to 0..=1; `tests/interop` compares them.
 
+mod calibration;
 mod continuity;
 mod disparity;
 mod distance;
@@ -48,6 +50,7 @@ mod sparsification;
 mod times;
 mod video;
 
+pub use calibration::{Calibration, CalibrationRow, CalibrationScore};
 pub use continuity::continuity;
 pub use disparity::{DisparityScore, DisparityStats};
 pub use epipolar::{Epipolar, MISALIGNED_PX, epipolar};

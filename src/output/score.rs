@@ -89,6 +89,15 @@ impl ScoreSink {
                 let mut alone = RegionCounts::default();
                 alone.add(&matching, |_| true, asked);
                 frame.regions = alone.total(threshold);
+                for (r, shape) in layout.regions.iter().enumerate() {
+                    let object = matching.pairs.iter().find(|(region, _)| *region == r);
+                    let stated = perception.regions.get(shape.index).map(|r| r.confidence);
+                    if let Some(stated) = stated
+                        && object.is_none_or(|&(_, o)| asked(o))
+                    {
+                        self.scores.confidence.add(f64::from(stated), object.is_some());
+                    }
+                }
                 frame.matched = matching
                     .pairs
                     .iter()

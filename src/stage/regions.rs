@@ -27,6 +27,12 @@ const MIN_MEAN_CONFIDENCE: f32 = 0.1;
 /// has 0.3; a strip of road 0.55; wrong matches all over the range 0.65.
 const MAX_SPREAD_PX: f32 = 1.0;
 const MAX_SPREAD_PART: f32 = 0.4;
+/// Weights of the confidence: logistic regression on 2100 regions of rendered
+/// streets and tables and of photographed tables; calibration error .05 to .09 on
+/// each of them, .09 on streets when those are left out of the regression.
+const CERTAINTY: f32 = -2.4;
+const PER_AREA: f32 = 1.3;
+const PER_VALID: f32 = 3.0;
 /// Distance at which nearness is one half, in metres.
 const NEAR_M: f32 = 10.0;
 
@@ -105,7 +111,7 @@ impl Regions {
             let id = index as u32 + 1;
             let region = regions.push_empty();
             let evidence = self.measure.run(id, bounds, &self.candidates.ids, source, region);
-            region.confidence = evidence.mean_confidence * region.valid_fraction.sqrt();
+            region.confidence = confidence(region);
             if let Some(count) = refusal(&evidence, region, rejections) {
                 *count += 1;
                 regions.truncate(regions.len() - 1);
@@ -141,6 +147,15 @@ impl Regions {
             );
         }
     }
+}
+
+/// Probability that a region is a thing of this outline (mask IoU of at least
+/// one half): logistic in the logarithm of its area and in the share of its
+/// pixels with disparity.
+fn confidence(region: &Region) -> f32 {
+    let area = (region.area as f32 / 1000.0).ln();
+    let score = CERTAINTY + PER_AREA * area + PER_VALID * region.valid_fraction;
+    1.0 / (1.0 + (-score).exp())
 }
 
 /// What comes first: mean saliency x confidence x nearness, where nearness is

@@ -3,7 +3,9 @@
 mod map;
 mod video;
 
-use salient_stereo::metric::{Confusion, DisparityStats, IdSwitches, Overlap, RegionCounts};
+use salient_stereo::metric::{
+    Calibration, Confusion, DisparityStats, IdSwitches, Overlap, RegionCounts,
+};
 
 /// Numbers that look random and are the same everywhere.
 struct Noise(u64);
@@ -160,4 +162,27 @@ fn identity_switches_by_hand() {
     switches.add([(1, 20), (2, 21)]); // object 1 takes over a track: a switch
     switches.add([(3, 0)]); // tracking off
     assert_eq!((switches.total(), switches.objects()), (Some(2), 2));
+}
+
+#[test]
+fn calibration_is_the_mean_distance_from_what_came_true() {
+    assert_eq!(Calibration::default().total(), None);
+    let mut halves = Calibration::default();
+    for i in 0..10 {
+        halves.add(0.85, i < 6);
+    }
+    let mut other = Calibration::default();
+    for i in 0..30 {
+        other.add(0.15, i < 3);
+    }
+    // 1 belongs to the last bin; what is no probability is left out.
+    other.add(1.0, true);
+    other.add(f64::NAN, true);
+    other.add(1.5, false);
+    halves.merge(&other);
+    let score = halves.total().unwrap();
+    assert_eq!(score.rows.iter().map(|r| r.count).collect::<Vec<_>>(), [30, 10, 1]);
+    assert!((score.rows[1].right - 0.6).abs() < 1e-12);
+    let expected = (30.0 * 0.05 + 10.0 * 0.25) / 41.0;
+    assert!((score.error - expected).abs() < 1e-12, "{}", score.error);
 }

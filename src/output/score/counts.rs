@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{IOU_THRESHOLDS, MAIN_THRESHOLD};
 use crate::metric::{
-    Confusion, DisparityScore, DisparityStats, IdSwitches, PixelScore, RegionCounts, RegionScore,
+    Calibration, CalibrationScore, Confusion, DisparityScore, DisparityStats, IdSwitches,
+    PixelScore, RegionCounts, RegionScore,
 };
 
 /// Everything counted so far. Counts of other scenes can be added.
@@ -21,6 +22,8 @@ pub struct Scores {
     pub(super) roi: RoiCoverage,
     pub(super) identities: IdSwitches,
     pub(super) distance: DistanceErrors,
+    #[serde(default)]
+    pub(super) confidence: Calibration,
 }
 
 impl Scores {
@@ -41,6 +44,7 @@ impl Scores {
         self.roi.merge(&other.roi);
         self.identities.merge(&other.identities);
         self.distance.merge(&other.distance);
+        self.confidence.merge(&other.confidence);
     }
 
     /// Everything so far; `None` when no observation had usable truth.
@@ -64,6 +68,7 @@ impl Scores {
             roi: self.roi.total(),
             id_switches: self.identities.total(),
             distance: self.distance.total(),
+            region_confidence: self.confidence.total(),
         })
     }
 }
@@ -173,6 +178,8 @@ pub struct ScoreSummary {
     pub id_switches: Option<u64>,
     /// Distances of matched regions.
     pub distance: Option<DistanceScore>,
+    /// Confidence of the regions against how many of them are objects (mask IoU ≥ 0.5).
+    pub region_confidence: Option<CalibrationScore>,
 }
 
 impl ScoreSummary {
