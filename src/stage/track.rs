@@ -100,9 +100,8 @@ impl Track {
     ///
     /// A new track is NEW until it was seen in `tracking.confirm` of the last
     /// three frames, then ACTIVE. An active track that is not seen is appended,
-    /// oldest first, as COASTED for up to `tracking.max_age` seconds (no longer
-    /// than it was seen), at its
-    /// predicted place: it takes the next free label, which no pixel of the
+    /// oldest first, as COASTED for up to `tracking.max_age` seconds (at most
+    /// 0.6 of the time for which it was seen), at its predicted place: it takes the next free label, which no pixel of the
     /// label image has; its disparity and depth are NaN (not measured) and its
     /// confidence falls to one half over that time. A track that ends without
     /// ever having been active is counted as `unstable`.

@@ -48,10 +48,8 @@ impl Box2 {
 /// Standard deviation of the centroid of one and the same object from frame to
 /// frame, in parts of its extent: a region never covers exactly the same pixels.
 const SEGMENTATION: f64 = 0.25;
-/// Frames for which a track is predicted, and its longest time unseen in parts
-/// of the time it was seen.
-const LONGEST_COAST: u32 = 3;
-const SEEN_PART: f64 = 0.5;
+/// Longest time for which a track is predicted, in parts of the time it was seen.
+const SEEN_PART: f64 = 0.6;
 
 /// Covariance of a region's position as a measurement of its object's position.
 fn noise(region: &Region) -> [f64; 9] {
@@ -159,11 +157,10 @@ impl Follow {
         stamp.seconds_since(self.last_seen)
     }
 
-    /// True while its prediction is worth publishing: a track coasts no longer
-    /// than it was seen.
+    /// True while its prediction is worth publishing: the longer a track was
+    /// seen, the longer it coasts.
     pub fn is_predictable(&self, stamp: Stamp) -> bool {
-        let seen = self.last_seen.seconds_since(self.born);
-        self.unseen_for(stamp) <= SEEN_PART * seen && self.history.trailing_zeros() <= LONGEST_COAST
+        self.unseen_for(stamp) <= SEEN_PART * self.last_seen.seconds_since(self.born)
     }
 
     /// True for a track that was never believed and can no longer become so
