@@ -125,7 +125,7 @@ impl Refine {
                 (&mut smooth[columns.clone()], &mut confidence[columns.clone()]);
             dispatch!(level, simd => {
                 median(simd, checked, outside, &area, y, smooth);
-                trust.row(simd, evidence, &roi.matched, &area, y, confidence);
+                trust.row(simd, evidence, &roi.matched, &area, y, smooth, confidence);
                 distrust(smooth, confidence, least);
             });
         });
@@ -246,6 +246,12 @@ fn check_row(
     let blocks = left.chunks(BLOCK).zip(evidence.chunks(BLOCK));
     let outs = out[columns.clone()].chunks_mut(BLOCK).zip(kept[columns.clone()].chunks_mut(BLOCK));
     for (i, ((left, evidence), (out, kept))) in blocks.zip(outs).enumerate() {
+        // Nothing was matched here: there is no evidence.
+        if evidence.iter().fold(0, |any, &e| any | e) == 0 {
+            out.fill(NO_MATCH);
+            kept.fill(0);
+            continue;
+        }
         let x = (columns.start + i * BLOCK) as i32;
         // Three loops without branches, of which only the one that looks up
         // the partners goes pixel by pixel.

@@ -45,6 +45,10 @@ fn median_lanes<S: Simd>(
     let none = i16x16::splat(simd, NO_MATCH);
     let centre = i16x16::from_slice(simd, &here[x..x + LANES]);
     let hole = centre.simd_eq(none);
+    if hole.all_true() {
+        none.store_slice(&mut out[x..x + LANES]);
+        return;
+    }
     // Of nine values in sorted columns, the median is the median of the
     // largest minimum, the middle median and the smallest maximum (Smith 1996).
     let rows = [above, here, below];

@@ -203,6 +203,9 @@ fn read_row<S: Simd>(simd: S, above: &[i16], here: &[i16], range: i16, out: &mut
         if let Some(known) = above.get(x..(x + WORD).min(above.len())) {
             over[..known.len()].copy_from_slice(known);
         }
+        if known.iter().fold(NO_MATCH, |most, &d| most.max(d)) == NO_MATCH {
+            continue;
+        }
         let (mut to_left, mut to_right, mut up, mut valid) = (0, 0, 0, 0);
         for lane in (0..WORD).step_by(LANES) {
             let centre = i16x16::from_slice(simd, &near[lane + 1..lane + 1 + LANES]);

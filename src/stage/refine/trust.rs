@@ -3,6 +3,7 @@
 use crate::image::Image;
 use crate::simd::Simd;
 use crate::stage::refine::Area;
+use crate::stage::stereo::NO_MATCH;
 
 /// Pixels from the centre of the window to its edge.
 pub const RADIUS: usize = 4;
@@ -40,8 +41,9 @@ impl Trust {
     /// Writes the confidence of the pixels of row `y` in `area`, from the mean of
     /// `evidence` over those of the 9x9 pixels around that are `matched`. A single
     /// cost curve says little: that its neighbours are as clear, and none was
-    /// rejected, says more.
+    /// rejected, says more. Blocks of pixels without any disparity (`smooth`) get none.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the inputs of one kernel")]
     pub fn row<S: Simd>(
         &self,
         _: S,
@@ -49,11 +51,16 @@ impl Trust {
         matched: &Image<u8>,
         area: &Area,
         y: usize,
+        smooth: &[i16],
         out: &mut [f32],
     ) {
         let rows =
             y.saturating_sub(RADIUS).max(area.rows.start)..(y + SIDE - RADIUS).min(area.rows.end);
-        for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+        for (block, (out, smooth)) in out.chunks_mut(BLOCK).zip(smooth.chunks(BLOCK)).enumerate() {
+            if smooth.iter().fold(NO_MATCH, |most, &d| most.max(d)) == NO_MATCH {
+                out.fill(0.0);
+                continue;
+            }
             let x = area.columns.start + block * BLOCK;
             // The window's columns, those outside the area empty.
             let from = x.saturating_sub(RADIUS).max(area.columns.start);
