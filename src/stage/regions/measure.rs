@@ -61,31 +61,33 @@ impl Measure {
         let (mut depth, mut depth_squares) = (0.0_f64, 0.0_f64);
         for y in bounds.y0..bounds.y1 {
             let columns = bounds.x0..bounds.x1;
-            let (s, d) = (
-                &source.saliency.row(y)[columns.clone()],
-                &source.disparity.row(y)[columns.clone()],
-            );
-            let (c, z) =
-                (&source.confidence.row(y)[columns.clone()], &source.depth.row(y)[columns.clone()]);
-            for (x, &at) in ids.row(y)[columns].iter().enumerate() {
-                let inside = at == id;
-                region.mask.push(if inside { 255 } else { 0 });
-                if !inside {
+            let ids = &ids.row(y)[columns.clone()];
+            region.mask.extend(ids.iter().map(|&at| if at == id { 255 } else { 0 }));
+            let seen = source.saliency.row(y)[columns.clone()]
+                .iter()
+                .zip(&source.confidence.row(y)[columns.clone()]);
+            let found = source.disparity.row(y)[columns.clone()]
+                .iter()
+                .zip(&source.depth.row(y)[columns.clone()]);
+            for (&at, ((&s, &c), (&d, &z))) in ids.iter().zip(seen.zip(found)) {
+                if at != id {
                     continue;
                 }
                 area += 1;
-                saliency += f64::from(s[x]);
-                max_saliency = max_saliency.max(s[x]);
-                if !d[x].is_nan() {
-                    confidence += f64::from(c[x]);
-                    disparity += f64::from(d[x]);
-                    disparity_squares += f64::from(d[x]).powi(2);
-                    self.disparities.push(d[x]);
+                saliency += f64::from(s);
+                max_saliency = max_saliency.max(s);
+                if !d.is_nan() {
+                    let d_wide = f64::from(d);
+                    confidence += f64::from(c);
+                    disparity += d_wide;
+                    disparity_squares += d_wide * d_wide;
+                    self.disparities.push(d);
                 }
-                if z[x].is_finite() {
-                    depth += f64::from(z[x]);
-                    depth_squares += f64::from(z[x]).powi(2);
-                    self.depths.push(z[x]);
+                if z.is_finite() {
+                    let z_wide = f64::from(z);
+                    depth += z_wide;
+                    depth_squares += z_wide * z_wide;
+                    self.depths.push(z);
                 }
             }
         }
@@ -141,26 +143,34 @@ fn locate(
     let lens = Lens::new(source.rig);
 
     let mut n = 0.0_f64;
-    let (mut position, mut sum, mut squares) = ([0.0_f64; 3], [0.0_f64; 3], [0.0_f64; 3]);
+    // Sums of u, v, d, of their squares, and of Z, uZ and vZ.
+    let (mut sum, mut squares) = ([0.0_f64; 3], [0.0_f64; 3]);
+    let (mut z_sum, mut uz_sum, mut vz_sum) = (0.0_f64, 0.0_f64, 0.0_f64);
     for y in bounds.y0..bounds.y1 {
         let columns = bounds.x0..bounds.x1;
         let row = ids.row(y)[columns.clone()]
             .iter()
             .zip(&source.disparity.row(y)[columns.clone()])
             .zip(&source.depth.row(y)[columns.clone()]);
+        let (mut row_n, mut row_z, v) = (0.0_f64, 0.0_f64, y as f64);
         for (x, ((&at, &d), &z)) in columns.zip(row) {
             if at != id || !z.is_finite() || (d - median).abs() > tolerance {
                 continue;
             }
-            let pixel = [x as f64, y as f64, f64::from(d)];
-            let point = lens.point(pixel[0], pixel[1], f64::from(z));
-            n += 1.0;
-            for i in 0..3 {
-                position[i] += point[i];
-                sum[i] += pixel[i];
-                squares[i] += pixel[i] * pixel[i];
-            }
+            let (u, d, z) = (x as f64, f64::from(d), f64::from(z));
+            row_n += 1.0;
+            row_z += z;
+            uz_sum += u * z;
+            sum[0] += u;
+            sum[2] += d;
+            squares[0] += u * u;
+            squares[2] += d * d;
         }
+        n += row_n;
+        z_sum += row_z;
+        vz_sum += v * row_z;
+        sum[1] += v * row_n;
+        squares[1] += v * v * row_n;
     }
     if n == 0.0 {
         return;
@@ -171,7 +181,7 @@ fn locate(
         let spread = (squares[i] / n - (sum[i] / n).powi(2)).max(0.0);
         systematic[i].powi(2) + spread / samples
     });
-    region.position = position.map(|p| p / n);
+    region.position = lens.point(uz_sum / z_sum, vz_sum / z_sum, z_sum / n);
     region.position_covariance =
         lens.covariance(sum[0] / n, sum[1] / n, region.position[2], variance);
 

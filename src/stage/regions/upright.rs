@@ -11,6 +11,28 @@ use crate::stage::standing::{Standing, Things};
 /// Places in a cell whose disparities are asked; their median is the cell's.
 const SAMPLES: [(usize, usize); 8] =
     [(0, 0), (2, 0), (1, 1), (3, 1), (0, 2), (2, 2), (1, 3), (3, 3)];
+/// Batcher's odd-even merge sort of as many (Batcher 1968).
+const EXCHANGES: [(usize, usize); 19] = [
+    (0, 1),
+    (2, 3),
+    (4, 5),
+    (6, 7),
+    (0, 2),
+    (1, 3),
+    (4, 6),
+    (5, 7),
+    (1, 2),
+    (5, 6),
+    (0, 4),
+    (1, 5),
+    (2, 6),
+    (3, 7),
+    (2, 4),
+    (3, 5),
+    (1, 2),
+    (3, 4),
+    (5, 6),
+];
 /// Samples with disparity that a cell needs.
 const LEAST_SAMPLES: usize = 3;
 /// Share of a thing's cells that must be salient.
@@ -156,20 +178,47 @@ impl Upright {
 /// Median disparity of some of the pixels of a cell, whose rows are given, from
 /// column `from` to column `last`; NaN with too few.
 fn median(rows: &[&[f32]; CELL], from: usize, last: usize) -> f32 {
-    let mut sorted = [f32::INFINITY; SAMPLES.len()];
+    // Holes go to the end. Exchanges without branches: which way they go is as
+    // random as the noise.
     let mut n = 0;
-    for (dx, dy) in SAMPLES {
+    let mut sorted = SAMPLES.map(|(dx, dy)| {
         let d = rows[dy][(from + dx).min(last)];
-        if d.is_nan() {
-            continue;
-        }
-        let mut at = n;
-        while at > 0 && sorted[at - 1] > d {
-            sorted[at] = sorted[at - 1];
-            at -= 1;
-        }
-        sorted[at] = d;
-        n += 1;
+        n += usize::from(!d.is_nan());
+        if d.is_nan() { f32::INFINITY } else { d }
+    });
+    for (i, j) in EXCHANGES {
+        let (low, high) = (sorted[i].min(sorted[j]), sorted[i].max(sorted[j]));
+        (sorted[i], sorted[j]) = (low, high);
     }
     if n < LEAST_SAMPLES { f32::NAN } else { sorted[n / 2] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_is_that_of_the_samples_that_there_are() {
+        // Every pattern of holes, in several orders of the values.
+        for holes in 0_u32..256 {
+            for turn in 0..8 {
+                let mut values = [[0.0_f32; CELL]; CELL];
+                let mut kept = Vec::new();
+                for (i, (x, y)) in SAMPLES.into_iter().enumerate() {
+                    let hole = holes >> i & 1 == 1;
+                    let value = ((i * 5 + turn * 3) % 8) as f32;
+                    values[y][x] = if hole { f32::NAN } else { value };
+                    kept.extend((!hole).then_some(value));
+                }
+                kept.sort_by(f32::total_cmp);
+                let rows: [&[f32]; CELL] = std::array::from_fn(|y| &values[y][..]);
+                let found = median(&rows, 0, CELL - 1);
+                if kept.len() < LEAST_SAMPLES {
+                    assert!(found.is_nan());
+                } else {
+                    assert_eq!(found.to_bits(), kept[kept.len() / 2].to_bits(), "{holes:b} {turn}");
+                }
+            }
+        }
+    }
 }
