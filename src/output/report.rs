@@ -107,7 +107,7 @@ struct Totals {
     frames: u64,
     regions: u64,
     roi_fraction: f64,
-    rejections: [u64; 8],
+    rejections: [u64; Rejections::KINDS],
     size: Option<Size>,
     first: Stamp,
     last: Stamp,
@@ -125,27 +125,7 @@ impl Totals {
         self.size = Some(perception.left.gray.size());
         self.regions += perception.regions.len() as u64;
         self.roi_fraction += f64::from(perception.roi.fraction);
-        let Rejections {
-            small_area,
-            low_confidence,
-            inconsistent_depth,
-            floating,
-            background,
-            not_salient,
-            unstable,
-            over_count,
-        } = perception.rejections;
-        let reasons = [
-            small_area,
-            low_confidence,
-            inconsistent_depth,
-            floating,
-            background,
-            not_salient,
-            unstable,
-            over_count,
-        ];
-        for (sum, count) in self.rejections.iter_mut().zip(reasons) {
+        for (sum, count) in self.rejections.iter_mut().zip(perception.rejections.counts()) {
             *sum += u64::from(count);
         }
     }

@@ -177,16 +177,38 @@ pub struct Rejections {
 }
 
 impl Rejections {
+    /// Kinds of rejection.
+    pub const KINDS: usize = 8;
+
+    /// What each count is called, in reports and diagnostics.
+    pub const REASONS: [&str; Self::KINDS] = [
+        "smaller than regions.min_area",
+        "low confidence or too few matches",
+        "inconsistent depth",
+        "not standing on the ground",
+        "part of a house front, or only seen between nearer things",
+        "not salient",
+        "seen in too few frames",
+        "beyond regions.max_count",
+    ];
+
+    /// The counts, in the order of [`Self::REASONS`].
+    pub const fn counts(&self) -> [u32; Self::KINDS] {
+        [
+            self.small_area,
+            self.low_confidence,
+            self.inconsistent_depth,
+            self.floating,
+            self.background,
+            self.not_salient,
+            self.unstable,
+            self.over_count,
+        ]
+    }
+
     /// All of them.
-    pub const fn total(&self) -> u32 {
-        self.small_area
-            + self.low_confidence
-            + self.inconsistent_depth
-            + self.floating
-            + self.background
-            + self.not_salient
-            + self.unstable
-            + self.over_count
+    pub fn total(&self) -> u32 {
+        self.counts().iter().sum()
     }
 }
 

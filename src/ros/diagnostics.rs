@@ -1,7 +1,9 @@
 //! The health of the node: counters that its threads write, and the
 //! `/diagnostics` message made of them once a second.
 
+mod draft;
 mod report;
+mod section;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -75,7 +77,7 @@ pub struct Work {
     /// Sum of the shares of the image that were matched.
     pub roi_fraction: f64,
     /// Candidates refused, summed.
-    pub rejections: [u64; 8],
+    pub rejections: [u64; Rejections::KINDS],
 }
 
 /// Whether the ground was seen in the last frame, and as which plane.
@@ -226,17 +228,7 @@ impl NodeStatus {
         }
         work.longest_ms = work.longest_ms.max(times.total());
         work.roi_fraction += f64::from(roi_fraction);
-        let refused = [
-            rejections.small_area,
-            rejections.low_confidence,
-            rejections.inconsistent_depth,
-            rejections.floating,
-            rejections.background,
-            rejections.not_salient,
-            rejections.unstable,
-            rejections.over_count,
-        ];
-        for (sum, count) in work.rejections.iter_mut().zip(refused) {
+        for (sum, count) in work.rejections.iter_mut().zip(rejections.counts()) {
             *sum += u64::from(count);
         }
     }

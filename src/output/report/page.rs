@@ -12,6 +12,7 @@ use crate::output::html::plot::Plot;
 use crate::output::html::template;
 use crate::output::html::text::{count, escape, hex, metres, ms, or_dash, percent, utc};
 use crate::output::picture::track_color;
+use crate::perception::Rejections;
 
 const BODY: &str = include_str!("page.html");
 const VIEWER: &str = include_str!("viewer.html");
@@ -202,18 +203,8 @@ fn counters(report: &ReportSink) -> String {
     for (name, number) in &report.counters {
         input += &row(name, *number);
     }
-    let reasons = [
-        "smaller than regions.min_area",
-        "low confidence or too few matches",
-        "inconsistent depth",
-        "not standing on the ground",
-        "part of a house front, or only seen between nearer things",
-        "not salient",
-        "seen in too few frames",
-        "beyond regions.max_count",
-    ];
     let mut output = row("regions published", report.totals.regions);
-    for (reason, number) in reasons.iter().zip(report.totals.rejections) {
+    for (reason, number) in Rejections::REASONS.iter().zip(report.totals.rejections) {
         output += &row(&format!("refused: {reason}"), number);
     }
     format!(

@@ -1,13 +1,12 @@
 //! The `/diagnostics` message: what is wrong, and what to do about it.
 
-use std::fmt::Display;
 use std::time::Instant;
 
-use super::{GroundSeen, NodeStatus, Totals, Work, lock};
+use super::draft::Draft;
+use super::section::{alignment, ground, processing};
+use super::{NodeStatus, Totals, lock};
 use crate::config::Config;
-use crate::metric::{Epipolar, MISALIGNED_PX};
-use crate::perception::Stage;
-use crate::ros::message::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::ros::message::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use crate::ros::message::std_msgs::Header;
 use crate::ros::node::receive_buffer_advice;
 use crate::stamp::Stamp;
@@ -46,50 +45,6 @@ pub struct Reporter {
 struct Received {
     left: u64,
     right: u64,
-}
-
-/// One status being filled.
-struct Draft {
-    level: u8,
-    message: String,
-    /// The part of the message that nobody else logs.
-    news: String,
-    values: Vec<KeyValue>,
-}
-
-impl Draft {
-    fn new() -> Self {
-        Self {
-            level: DiagnosticStatus::OK,
-            message: String::new(),
-            news: String::new(),
-            values: Vec::new(),
-        }
-    }
-
-    /// Says what is wrong; logged when the status becomes worse.
-    fn say(&mut self, level: u8, message: impl Display) {
-        let message = message.to_string();
-        append(&mut self.news, &message);
-        self.say_again(level, message);
-    }
-
-    /// Says what another place has logged already.
-    fn say_again(&mut self, level: u8, message: impl Display) {
-        self.level = self.level.max(level);
-        append(&mut self.message, &message.to_string());
-    }
-
-    fn value(&mut self, key: impl Into<String>, value: impl Display) {
-        self.values.push(KeyValue { key: key.into(), value: value.to_string() });
-    }
-}
-
-fn append(text: &mut String, sentence: &str) {
-    if !text.is_empty() {
-        text.push_str("; ");
-    }
-    text.push_str(sentence);
 }
 
 impl Reporter {
@@ -281,64 +236,10 @@ impl Reporter {
     }
 }
 
-fn alignment(found: &Epipolar, rectify: bool, draft: &mut Draft) {
-    draft.value("vertical offset of matched points (px)", format_args!("{:.2}", found.offset_px));
-    draft.value("epipolar error (px)", format_args!("{:.2}", found.error_px));
-    draft.value("points matched for it", found.points);
-    if found.error_px > MISALIGNED_PX {
-        let fix = if rectify { "" } else { ", or set rectify for raw images" };
-        draft.say(
-            DiagnosticStatus::WARN,
-            format_args!(
-                "rows of the two images are {:.1} px apart (median of {} points): calibrate the cameras anew{fix}",
-                found.error_px, found.points
-            ),
-        );
-    }
-}
-
-fn ground(seen: Option<&GroundSeen>) -> String {
-    match seen {
-        None => "not looked for".to_owned(),
-        Some((state, None)) => state.name().to_owned(),
-        Some((state, Some(plane))) => {
-            format!("{}, camera {:.2} m above it", state.name(), plane.camera_height_m)
-        }
-    }
-}
-
-fn processing(work: &Work) -> Draft {
-    let mut draft = Draft::new();
-    if work.frames == 0 {
-        return draft;
-    }
-    let frames = f64::from(work.frames);
-    for (stage, sum) in Stage::ALL.into_iter().zip(work.stage_ms) {
-        draft.value(format!("{} (ms)", stage.name()), format_args!("{:.2}", sum / frames));
-    }
-    let total: f64 = work.stage_ms.iter().sum();
-    draft.value("total (ms)", format_args!("{:.2}", total / frames));
-    draft.value("longest frame (ms)", format_args!("{:.2}", work.longest_ms));
-    draft.value("share of the image matched", format_args!("{:.3}", work.roi_fraction / frames));
-    let names = [
-        "small area",
-        "low confidence",
-        "inconsistent depth",
-        "not standing on the ground",
-        "background",
-        "not salient",
-        "unstable",
-        "over count",
-    ];
-    for (name, count) in names.into_iter().zip(work.rejections) {
-        draft.value(format!("candidates refused: {name}"), count);
-    }
-    draft
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metric::Epipolar;
     use crate::stage::ground::{GroundState, Plane};
 
     fn status<'a>(message: &'a DiagnosticArray, name: &str) -> &'a DiagnosticStatus {
