@@ -266,7 +266,8 @@ def summary(rows, args):
     """The figures of all scenes in one table per rectangle."""
     lines = [f"Ranges 0..{args.disparities}; {args.rounds} interleaved rounds, medians; OpenCV {cv2.__version__} on one "
              "thread. EPE, D1, bad-2 and density over non-occluded pixels; filled: all true pixels after every hole took "
-             "the smaller disparity of its row neighbours. Pairs of figures: we / OpenCV SGBM + speckle filter."]
+             "the smaller disparity of its row neighbours. Pairs of figures: we / OpenCV SGBM + speckle filter. "
+             "Errors in a rectangle are those of the full-frame disparity inside it; times are of the rectangle alone."]
     for fraction in args.roi or [0.25, 1.0]:
         where = "full frame" if fraction >= 1 else f"centred {100 * fraction:.0f} %"
         lines += ["", f"| {where} | times faster than SGBM, 1 / 2 threads | EPE px | D1 % | bad-2 % | dense % "
