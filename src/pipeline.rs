@@ -57,7 +57,7 @@ impl Pipeline {
             stereo: Stereo::new(config, size, level),
             refine: Refine::new(config, size),
             depth: Depth::new(config),
-            regions: Regions::new(config, size),
+            regions: Regions::new(config, size, level),
             track: Track::new(config),
             previous: Previous::default(),
             latency: Latency::new(config.max_latency),

@@ -11,6 +11,7 @@ use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::{Image, Size};
 use crate::perception::{Region, RegionList, Rejections, RoiMask};
+use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::ground::Plane;
 use components::{Candidates, Components};
@@ -73,16 +74,16 @@ pub struct Regions {
 
 impl Regions {
     /// The stage for images of `size`.
-    pub fn new(config: &Config, size: Size) -> Self {
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
         Self {
             size,
             min_area: usize::try_from(config.regions.min_area).unwrap_or(1),
             max_count: usize::try_from(config.regions.max_count).unwrap_or(1),
             contour_tolerance: config.regions.contour_tolerance as f32,
             components: Components::default(),
-            upright: Upright::default(),
+            upright: Upright::new(level),
             candidates: Candidates::default(),
-            measure: Measure::default(),
+            measure: Measure::new(level),
             contour: Contour::default(),
         }
     }

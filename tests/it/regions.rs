@@ -8,6 +8,7 @@ use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::{RegionList, Rejections, RoiMask};
+use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::depth::Depth;
 use salient_stereo::stage::regions::components::{Candidates, Components, agree};
@@ -319,9 +320,18 @@ impl Boxes {
             rig: &rig,
             plane: None,
         };
-        let mut out = (Image::default(), RegionList::default(), Rejections::default());
-        Regions::new(config, self.size).run(&source, &mut out.0, &mut out.1, &mut out.2);
-        out
+        let mut outs = simd::available().into_iter().map(|level| {
+            let mut out = (Image::default(), RegionList::default(), Rejections::default());
+            let mut regions = Regions::new(config, self.size, level);
+            regions.run(&source, &mut out.0, &mut out.1, &mut out.2);
+            out
+        });
+        let plain = outs.next().expect("there is always a level");
+        for out in outs {
+            assert_eq!(format!("{:?}", out.1), format!("{:?}", plain.1));
+            assert_eq!(out.0.pixels(), plain.0.pixels());
+        }
+        plain
     }
 }
 
@@ -466,6 +476,34 @@ fn labels_follow_priority() {
     for r in regions.iter() {
         assert_eq!(labels.get(r.x as usize + 1, r.y as usize + 1), r.label);
     }
+}
+
+#[test]
+fn a_region_up_to_the_image_edges_is_measured_whole() {
+    // More rows than are added in single precision, and columns that fill no vector.
+    let mut scene = Boxes::new(83, 71);
+    let hole = |u: usize, v: usize| (u * u + v).is_multiple_of(5);
+    let plane = |u: usize, v: usize| 20.0 + 0.03 * u as f32 + 0.01 * v as f32;
+    scene.add(1, 1, 82, 70, |u, v| if hole(u, v) { f32::NAN } else { plane(u, v) });
+    let (_, regions, _) = scene.run(&Config::default());
+    let r = &regions[0];
+    assert_eq!((regions.len(), r.x, r.y, r.width, r.height), (1, 1, 1, 82, 70));
+    assert_eq!((r.area, r.mask.iter().all(|m| *m == 255)), (82 * 70, true));
+    let mut sums = [0.0_f64; 4];
+    for (u, v) in (1..71).flat_map(|v| (1..83).map(move |u| (u, v))).filter(|&(u, v)| !hole(u, v)) {
+        let z = F * BASELINE / f64::from(plane(u, v));
+        let (cx, cy) = rig(scene.size).principal_point();
+        let place = [z * (u as f64 - cx) / F, z * (v as f64 - cy) / F, z];
+        sums = [sums[0] + place[0], sums[1] + place[1], sums[2] + place[2], sums[3] + 1.0];
+    }
+    for axis in 0..3 {
+        assert!(
+            (r.position[axis] - sums[axis] / sums[3]).abs() < 1e-4,
+            "{:?} {sums:?}",
+            r.position
+        );
+    }
+    assert!((f64::from(r.valid_fraction) - sums[3] / 5740.0).abs() < 1e-6);
 }
 
 #[test]

@@ -80,19 +80,23 @@ impl Candidates {
         self.boxes.resize(count, PixelBox::NONE);
     }
 
-    /// Gives those pixels of row `y` from column `x` on to candidate `id` for
-    /// which `inside` says so.
-    pub fn mark(&mut self, id: u32, x: usize, y: usize, inside: impl Iterator<Item = bool>) {
-        let b = &mut self.boxes[id as usize - 1];
-        let row = self.ids.row_mut(y)[x..].iter_mut();
-        for (x, (pixel, _)) in (x..).zip(row.zip(inside)).filter(|(_, (_, inside))| *inside) {
-            *pixel = id;
-            b.x0 = b.x0.min(x);
-            b.x1 = b.x1.max(x + 1);
-            b.y0 = b.y0.min(y);
-            b.y1 = b.y1.max(y + 1);
-            b.area += 1;
+    /// Gives those of `columns` pixels of row `y` from column `x` on to
+    /// candidate `id` whose bit is set, the first pixel's being the lowest.
+    #[inline(always)]
+    pub fn mark(&mut self, id: u32, x: usize, y: usize, columns: usize, bits: u32) {
+        let bits = bits & ((1 << columns) - 1);
+        if bits == 0 {
+            return;
         }
+        for (i, pixel) in self.ids.row_mut(y)[x..x + columns].iter_mut().enumerate() {
+            *pixel = if bits >> i & 1 == 1 { id } else { *pixel };
+        }
+        let b = &mut self.boxes[id as usize - 1];
+        b.x0 = b.x0.min(x + bits.trailing_zeros() as usize);
+        b.x1 = b.x1.max(x + 32 - bits.leading_zeros() as usize);
+        b.y0 = b.y0.min(y);
+        b.y1 = b.y1.max(y + 1);
+        b.area += bits.count_ones() as usize;
     }
 
     /// Numbers the boxes again from `ids`, of which there are `count`.

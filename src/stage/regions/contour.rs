@@ -27,16 +27,21 @@ impl Contour {
         self.met.clear();
         self.met.resize(mask.len(), false);
         let mut most = i64::MIN;
-        for start in 0..mask.len() {
-            if mask[start] == 0 || self.met[start] || !is_upper_end(mask, width, start) {
-                continue;
-            }
-            self.follow_from(mask, width, start);
-            // The boundary of a hole runs the other way round and counts negative.
-            let enclosed = doubled_area(&self.part);
-            if enclosed > most {
-                most = enclosed;
-                std::mem::swap(&mut self.boundary, &mut self.part);
+        for (y, row) in mask.chunks_exact(width.max(1)).enumerate() {
+            let mut from = 0;
+            while let Some(x) = next_western_end(row, from) {
+                from = x + 1;
+                let start = y * width + x;
+                if self.met[start] || !is_upper_end(mask, width, start) {
+                    continue;
+                }
+                self.follow_from(mask, width, start);
+                // The boundary of a hole runs the other way round and counts negative.
+                let enclosed = doubled_area(&self.part);
+                if enclosed > most {
+                    most = enclosed;
+                    std::mem::swap(&mut self.boundary, &mut self.part);
+                }
             }
         }
         &self.boundary
@@ -97,6 +102,24 @@ impl Contour {
             out.push([point[0] as f32 + origin[0] as f32, point[1] as f32 + origin[1] as f32]);
         }
     }
+}
+
+/// The first pixel from column `from` of a row on whose western neighbour is outside.
+fn next_western_end(row: &[u8], from: usize) -> Option<usize> {
+    let word = |x: usize| row[x..].first_chunk().map(|bytes| u64::from_ne_bytes(*bytes));
+    let mut x = from;
+    while x < row.len() {
+        let west = x.checked_sub(1);
+        if row[x] != 0 && west.is_none_or(|west| row[west] == 0) {
+            return Some(x);
+        }
+        // Eight pixels at once of which each is outside or follows one inside.
+        let none = west
+            .and_then(|west| Some(word(x)? & !word(west)?))
+            .is_some_and(|western_ends| western_ends == 0);
+        x += if none { 8 } else { 1 };
+    }
+    None
 }
 
 /// True where the neighbours to the west and to the north are all outside, as

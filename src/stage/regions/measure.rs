@@ -1,10 +1,15 @@
 //! The measures of one region.
 
+mod sums;
+
 use super::RegionSource;
 use super::components::PixelBox;
 use crate::camera::StereoRig;
 use crate::image::Image;
 use crate::perception::Region;
+use crate::simd::Level;
+use crate::stage::depth::EPSILON_PX;
+use sums::{Centre, Sums};
 
 /// Standard deviation of a region's disparity that more pixels do not reduce:
 /// sub-pixel bias and calibration, in pixels.
@@ -14,8 +19,11 @@ const SYSTEMATIC_PX: f64 = 0.15;
 const BOUNDARY_PX: f64 = 0.5;
 /// Neighbouring pixels share their matching window: this many count as one.
 const PIXELS_PER_SAMPLE: f64 = 25.0;
-/// Values of which percentiles are taken.
-const MOST_VALUES: usize = 4096;
+/// Values of which percentiles are taken, about.
+const MOST_VALUES: usize = 2048;
+/// Columns by which the sample of a row lies beside that of the row above: a
+/// number that shares no factor with a usual step.
+const SHIFT: usize = 7;
 /// Robust standard deviations within which a disparity counts for the centroid.
 const INLIER_SIGMAS: f32 = 3.0;
 
@@ -33,15 +41,24 @@ pub struct Evidence {
 }
 
 /// The measuring of regions, with its buffers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Measure {
-    disparities: Vec<f32>,
-    depths: Vec<f32>,
+    level: Level,
+    sample: Vec<f32>,
 }
 
 impl Measure {
+    /// The measuring with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self { level, sample: Vec::new() }
+    }
+
     /// Fills box, mask and all measures of `region` from the pixels of `bounds`
     /// whose id is `id`. Label, track, contour and confidence are left alone.
+    ///
+    /// Depth is a falling function of disparity, so that the percentiles of the
+    /// one are those of the other; they are taken of a sample of the pixels
+    /// with finite depth.
     pub fn run(
         &mut self,
         id: u32,
@@ -52,68 +69,64 @@ impl Measure {
     ) -> Evidence {
         (region.x, region.y) = (bounds.x0 as u32, bounds.y0 as u32);
         (region.width, region.height) = (bounds.width() as u32, bounds.height() as u32);
-        region.mask.clear();
-        self.disparities.clear();
-        self.depths.clear();
 
-        let (mut area, mut saliency, mut max_saliency) = (0_u32, 0.0_f64, 0.0_f32);
-        let (mut confidence, mut disparity, mut disparity_squares) = (0.0_f64, 0.0_f64, 0.0_f64);
-        let (mut depth, mut depth_squares) = (0.0_f64, 0.0_f64);
-        for y in bounds.y0..bounds.y1 {
-            let columns = bounds.x0..bounds.x1;
-            let ids = &ids.row(y)[columns.clone()];
-            region.mask.extend(ids.iter().map(|&at| if at == id { 255 } else { 0 }));
-            let seen = source.saliency.row(y)[columns.clone()]
-                .iter()
-                .zip(&source.confidence.row(y)[columns.clone()]);
-            let found = source.disparity.row(y)[columns.clone()]
-                .iter()
-                .zip(&source.depth.row(y)[columns.clone()]);
-            for (&at, ((&s, &c), (&d, &z))) in ids.iter().zip(seen.zip(found)) {
-                if at != id {
-                    continue;
-                }
-                area += 1;
-                saliency += f64::from(s);
-                max_saliency = max_saliency.max(s);
-                if !d.is_nan() {
-                    let d_wide = f64::from(d);
-                    confidence += f64::from(c);
-                    disparity += d_wide;
-                    disparity_squares += d_wide * d_wide;
-                    self.disparities.push(d);
-                }
-                if z.is_finite() {
-                    let z_wide = f64::from(z);
-                    depth += z_wide;
-                    depth_squares += z_wide * z_wide;
-                    self.depths.push(z);
-                }
-            }
-        }
-
-        let valid = self.disparities.len() as f64;
-        region.area = area;
-        region.mean_saliency = (saliency / f64::from(area)) as f32;
-        region.max_saliency = max_saliency;
-        region.valid_fraction = (valid / f64::from(area)) as f32;
-        // Without a single valid pixel the means are 0/0 = NaN, as they should be.
-        let (mean, deviation) = mean_and_deviation(disparity, disparity_squares, valid);
-        (region.mean_disparity, region.disparity_stddev) = (mean as f32, deviation as f32);
-        let (mean, deviation) = mean_and_deviation(depth, depth_squares, self.depths.len() as f64);
-        (region.mean_depth, region.depth_stddev) = (mean as f32, deviation as f32);
-
-        thin(&mut self.depths);
-        thin(&mut self.disparities);
-        let [near, median, far] = percentiles(&mut self.depths, [0.05, 0.5, 0.95]);
-        (region.near_depth, region.median_depth, region.far_depth) = (near, median, far);
-        let [low, middle, high] = percentiles(&mut self.disparities, [0.16, 0.5, 0.84]);
+        self.collect(id, bounds, ids, source);
+        let [far, low, middle, high, near] =
+            percentiles(&mut self.sample, [0.05, 0.16, 0.5, 0.84, 0.95]);
         let spread = (high - low) / 2.0;
-        locate(bounds, id, ids, source, middle, spread, region);
+        let scale = source.rig.depth_scale() as f32;
+        [region.near_depth, region.median_depth, region.far_depth] =
+            [near, middle, far].map(|d| scale / (d + EPSILON_PX));
+
+        let known = |value: f32| if value.is_nan() { 0.0 } else { value };
+        let centre = Centre {
+            disparity: known(middle),
+            depth: known(region.median_depth),
+            u: (bounds.x0 + bounds.x1) as f32 / 2.0,
+            v: (bounds.y0 + bounds.y1) as f32 / 2.0,
+            tolerance: (INLIER_SIGMAS * spread).max(1.0),
+        };
+        region.mask.clear();
+        region.mask.resize(bounds.width() * bounds.height(), 0);
+        let sums = Sums::of(self.level, id, bounds, ids, source, &centre, &mut region.mask);
+
+        region.area = sums.area as u32;
+        region.mean_saliency = (sums.saliency / sums.area) as f32;
+        region.max_saliency = sums.max_saliency;
+        region.valid_fraction = (sums.valid / sums.area) as f32;
+        // Without a single valid pixel the means are 0/0 = NaN, as they should be.
+        let (mean, deviation) = mean_and_deviation(sums.disparity, sums.valid);
+        region.mean_disparity = (f64::from(centre.disparity) + mean) as f32;
+        region.disparity_stddev = deviation as f32;
+        let (mean, deviation) = mean_and_deviation(sums.depth, sums.finite);
+        region.mean_depth = (f64::from(centre.depth) + mean) as f32;
+        region.depth_stddev = deviation as f32;
+        locate(bounds, &centre, &sums, source.rig, region);
         Evidence {
-            mean_confidence: if valid > 0.0 { (confidence / valid) as f32 } else { 0.0 },
+            mean_confidence: if sums.valid > 0.0 {
+                (sums.confidence / sums.valid) as f32
+            } else {
+                0.0
+            },
             median_disparity: middle,
             spread,
+        }
+    }
+
+    /// Disparities of pixels with finite depth: of all, or in large regions of
+    /// every n-th in a row, another one in each row.
+    fn collect(&mut self, id: u32, bounds: &PixelBox, ids: &Image<u32>, source: &RegionSource<'_>) {
+        let step = bounds.area.div_ceil(MOST_VALUES).max(1);
+        self.sample.clear();
+        for y in bounds.y0..bounds.y1 {
+            let [d, z] = [source.disparity, source.depth].map(|map| map.row(y));
+            let ids = ids.row(y);
+            let from = bounds.x0 + y * SHIFT % step;
+            for x in (from..bounds.x1).step_by(step) {
+                if ids[x] == id && z[x].is_finite() {
+                    self.sample.push(d[x]);
+                }
+            }
         }
     }
 }
@@ -126,64 +139,28 @@ impl Measure {
 /// J diag(σu², σv², σd²) Jᵀ, where J = ∂(X, Y, Z)/∂(u, v, d) of
 /// Z = fB/d, X = (u − cx) Z/fx, Y = (v − cy) Z/fy, and each σ² is a systematic
 /// part plus the pixels' variance over the number of independent samples.
-fn locate(
-    bounds: &PixelBox,
-    id: u32,
-    ids: &Image<u32>,
-    source: &RegionSource<'_>,
-    median: f32,
-    spread: f32,
-    region: &mut Region,
-) {
+fn locate(bounds: &PixelBox, centre: &Centre, sums: &Sums, rig: &StereoRig, region: &mut Region) {
     region.position = [f64::NAN; 3];
     region.position_covariance = [f64::NAN; 9];
     region.extent = [f64::NAN; 3];
     region.velocity = [f64::NAN; 3];
-    let tolerance = (INLIER_SIGMAS * spread).max(1.0);
-    let lens = Lens::new(source.rig);
-
-    let mut n = 0.0_f64;
-    // Sums of u, v, d, of their squares, and of Z, uZ and vZ.
-    let (mut sum, mut squares) = ([0.0_f64; 3], [0.0_f64; 3]);
-    let (mut z_sum, mut uz_sum, mut vz_sum) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for y in bounds.y0..bounds.y1 {
-        let columns = bounds.x0..bounds.x1;
-        let row = ids.row(y)[columns.clone()]
-            .iter()
-            .zip(&source.disparity.row(y)[columns.clone()])
-            .zip(&source.depth.row(y)[columns.clone()]);
-        let (mut row_n, mut row_z, v) = (0.0_f64, 0.0_f64, y as f64);
-        for (x, ((&at, &d), &z)) in columns.zip(row) {
-            if at != id || !z.is_finite() || (d - median).abs() > tolerance {
-                continue;
-            }
-            let (u, d, z) = (x as f64, f64::from(d), f64::from(z));
-            row_n += 1.0;
-            row_z += z;
-            uz_sum += u * z;
-            sum[0] += u;
-            sum[2] += d;
-            squares[0] += u * u;
-            squares[2] += d * d;
-        }
-        n += row_n;
-        z_sum += row_z;
-        vz_sum += v * row_z;
-        sum[1] += v * row_n;
-        squares[1] += v * v * row_n;
-    }
+    let n = sums.inliers;
     if n == 0.0 {
         return;
     }
+    let lens = Lens::new(rig);
     let samples = (n / PIXELS_PER_SAMPLE).max(1.0);
     let systematic = [BOUNDARY_PX, BOUNDARY_PX, SYSTEMATIC_PX];
     let variance: [f64; 3] = std::array::from_fn(|i| {
-        let spread = (squares[i] / n - (sum[i] / n).powi(2)).max(0.0);
-        systematic[i].powi(2) + spread / samples
+        let (_, deviation) = mean_and_deviation(sums.place[i], n);
+        systematic[i].powi(2) + deviation.powi(2) / samples
     });
-    region.position = lens.point(uz_sum / z_sum, vz_sum / z_sum, z_sum / n);
+    let (u, v) = (f64::from(centre.u), f64::from(centre.v));
+    let [z, uz, vz] = sums.weighted;
+    region.position = lens.point(u + uz / z, v + vz / z, z / n);
+    let [[u1, _], [v1, _], _] = sums.place;
     region.position_covariance =
-        lens.covariance(sum[0] / n, sum[1] / n, region.position[2], variance);
+        lens.covariance(u + u1 / n, v + v1 / n, region.position[2], variance);
 
     let z = f64::from(region.median_depth);
     region.extent = [
@@ -225,26 +202,18 @@ impl Lens {
     }
 }
 
-/// Mean and standard deviation (of the whole, not of a sample) from sums.
-fn mean_and_deviation(sum: f64, squares: f64, n: f64) -> (f64, f64) {
+/// Mean and standard deviation (of the whole, not of a sample) from the sums of
+/// `n` values and of their squares.
+fn mean_and_deviation([sum, squares]: [f64; 2], n: f64) -> (f64, f64) {
     let mean = sum / n;
     let variance = squares / n - mean * mean;
     // `max` would turn NaN into 0.
     (mean, if variance < 0.0 { 0.0 } else { variance.sqrt() })
 }
 
-/// Keeps every n-th value of many: percentiles need no more.
-fn thin(values: &mut Vec<f32>) {
-    let step = values.len().div_ceil(MOST_VALUES).max(1);
-    for (to, from) in (0..values.len()).step_by(step).enumerate() {
-        values[to] = values[from];
-    }
-    values.truncate(values.len().div_ceil(step));
-}
-
-/// Three ascending percentiles, each interpolated between its two neighbours;
-/// NaN when there is no value. Reorders the values, in linear time.
-fn percentiles(values: &mut [f32], parts: [f32; 3]) -> [f32; 3] {
+/// Ascending percentiles, each interpolated between its two neighbours; NaN
+/// when there is no value. Reorders the values, in linear time.
+fn percentiles<const N: usize>(values: &mut [f32], parts: [f32; N]) -> [f32; N] {
     let mut from = 0;
     parts.map(|part| {
         if values.is_empty() {

@@ -4,6 +4,7 @@ use super::RegionSource;
 use super::components::{Candidates, tolerance};
 use crate::image::Image;
 use crate::perception::Rejections;
+use crate::simd::{Level, Simd, dispatch, f32x4, prelude::*};
 use crate::stage::coarse::CELL;
 use crate::stage::ground::Plane;
 use crate::stage::standing::{Standing, Things};
@@ -42,9 +43,13 @@ const SURFACE_PART: f32 = 0.1;
 const SURFACE_PX: f32 = 0.7;
 const GROUND_PX: f32 = 0.3;
 
+/// Cells whose medians are taken at once.
+const LANES: usize = 8;
+
 /// The former of such regions, with its buffers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Upright {
+    level: Level,
     standing: Standing,
     things: Things,
     cells: Image<f32>,
@@ -53,6 +58,18 @@ pub struct Upright {
 }
 
 impl Upright {
+    /// The former with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self {
+            level,
+            standing: Standing::default(),
+            things: Things::default(),
+            cells: Image::default(),
+            salient: Vec::new(),
+            number: Vec::new(),
+        }
+    }
+
     /// Candidates for regions on `plane`, of things of at least `min_area`
     /// pixels; those that are refused here are counted.
     pub fn run(
@@ -79,19 +96,33 @@ impl Upright {
         self.cells.resize(size.divided_by(CELL));
         let offset = source.rig.disparity_offset() as f32;
         for cy in 0..self.cells.height() {
-            // Rows and columns of the cell inside the image, and whether any is matched.
+            // Rows of the cell inside the image, and whether any is matched.
             let rows: [usize; CELL] = std::array::from_fn(|i| (cy * CELL + i).min(size.height - 1));
             let matched = [rows[0], rows[CELL - 1]].map(|y| source.roi.matched.row(y));
             let disparity = rows.map(|y| source.disparity.row(y));
             let coarse = source.coarse.checked.row(cy);
-            for (cx, out) in self.cells.row_mut(cy).iter_mut().enumerate() {
-                let from = cx * CELL;
-                let last = (from + CELL - 1).min(size.width - 1);
-                let any = matched.iter().any(|row| row[from] != 0 || row[last] != 0);
-                // What was not matched finely is known coarsely.
-                *out = if any { median(&disparity, from, last) } else { f32::NAN };
-                if out.is_nan() {
-                    *out = coarse[cx] - offset;
+            let cells = self.cells.row_mut(cy).chunks_mut(LANES);
+            for ((cells, coarse), first) in
+                cells.zip(coarse.chunks(LANES)).zip((0..).step_by(LANES))
+            {
+                let any = |cell: usize| {
+                    let from = (first + cell) * CELL;
+                    let last = (from + CELL - 1).min(size.width - 1);
+                    matched.iter().any(|row| row[from] != 0 || row[last] != 0)
+                };
+                let fine: [bool; LANES] =
+                    std::array::from_fn(|cell| cell < cells.len() && any(cell));
+                let mut medians = [f32::NAN; LANES];
+                if fine.contains(&true) {
+                    dispatch!(self.level, _simd => {
+                        medians_of(&disparity, first * CELL, &mut medians);
+                    });
+                }
+                for (((out, coarse), median), fine) in
+                    cells.iter_mut().zip(coarse).zip(medians).zip(fine)
+                {
+                    // What was not matched finely is known coarsely.
+                    *out = if fine && !median.is_nan() { median } else { coarse - offset };
                 }
             }
         }
@@ -158,39 +189,92 @@ impl Upright {
                     own && (cx == 0 || left == id) && (cx + 1 == row.len() || right == id);
                 let tolerance =
                     if own { (SURFACE_PART * surface).max(SURFACE_PX) } else { tolerance(surface) };
-                let columns = cx * CELL..(cx * CELL + CELL).min(size.width);
-                for y in cy * CELL..(cy * CELL + CELL).min(size.height) {
-                    // What does not rise above the ground is none of the thing.
-                    let ground = plane.disparity(columns.start as f32 + 1.5, y as f32) + GROUND_PX;
-                    let unmatched = own && source.roi.matched.row(y)[columns.start] == 0;
-                    let fill = interior || unmatched;
-                    let d = &source.disparity.row(y)[columns.clone()];
-                    let inside = |d: f32| {
-                        (d.is_nan() && fill) || ((d - surface).abs() <= tolerance && d > ground)
-                    };
-                    out.mark(id, columns.start, y, d.iter().map(|&d| inside(d)));
-                }
+                let cell =
+                    Cell { x: cx * CELL, y: cy * CELL, id, own, interior, surface, tolerance };
+                dispatch!(self.level, simd => cell.paint(simd, plane, source, out));
             }
         }
     }
 }
 
-/// Median disparity of some of the pixels of a cell, whose rows are given, from
-/// column `from` to column `last`; NaN with too few.
-fn median(rows: &[&[f32]; CELL], from: usize, last: usize) -> f32 {
+/// A cell that may have pixels of a thing.
+struct Cell {
+    /// Its left upper pixel.
+    x: usize,
+    y: usize,
+    /// The thing's number.
+    id: u32,
+    /// It is one of the thing's own; else it lies beside or above one.
+    own: bool,
+    /// So are its neighbours to the left and to the right.
+    interior: bool,
+    /// Disparity of the thing there, and how far from it a pixel's may be.
+    surface: f32,
+    tolerance: f32,
+}
+
+impl Cell {
+    /// Gives those pixels to the thing that are on its surface, and the holes in it.
+    #[inline(always)]
+    fn paint<S: Simd>(
+        &self,
+        simd: S,
+        plane: &Plane,
+        source: &RegionSource<'_>,
+        out: &mut Candidates,
+    ) {
+        let size = source.disparity.size();
+        let columns = (size.width - self.x).min(CELL);
+        for y in self.y..(self.y + CELL).min(size.height) {
+            // What does not rise above the ground is none of the thing.
+            let ground = plane.disparity(self.x as f32 + 1.5, y as f32) + GROUND_PX;
+            let unmatched = self.own && source.roi.matched.row(y)[self.x] == 0;
+            let row = &source.disparity.row(y)[self.x..];
+            let pixels: [f32; CELL] = if let Some(pixels) = row.first_chunk() {
+                *pixels
+            } else {
+                let mut pixels = [f32::NAN; CELL];
+                pixels[..columns].copy_from_slice(row);
+                pixels
+            };
+            let d = f32x4::from_slice(simd, &pixels);
+            let on = (d - self.surface).abs().simd_le(self.tolerance) & d.simd_gt(ground);
+            let holes = if self.interior || unmatched { !d.simd_eq(d).to_bitmask() } else { 0 };
+            out.mark(self.id, self.x, y, columns, (on.to_bitmask() | holes) as u32);
+        }
+    }
+}
+
+/// Median disparity of some of the pixels of each of several cells, whose rows
+/// are given, from column `from` on; NaN with too few.
+#[inline(always)]
+fn medians_of(rows: &[&[f32]; CELL], from: usize, medians: &mut [f32; LANES]) {
     // Holes go to the end. Exchanges without branches: which way they go is as
     // random as the noise.
-    let mut n = 0;
-    let mut sorted = SAMPLES.map(|(dx, dy)| {
-        let d = rows[dy][(from + dx).min(last)];
-        n += usize::from(!d.is_nan());
-        if d.is_nan() { f32::INFINITY } else { d }
-    });
-    for (i, j) in EXCHANGES {
-        let (low, high) = (sorted[i].min(sorted[j]), sorted[i].max(sorted[j]));
-        (sorted[i], sorted[j]) = (low, high);
+    let last = rows[0].len() - 1;
+    let mut sorted = [[0.0_f32; LANES]; SAMPLES.len()];
+    for (sample, (dx, dy)) in sorted.iter_mut().zip(SAMPLES) {
+        for (cell, d) in sample.iter_mut().enumerate() {
+            *d = rows[dy][(from + cell * CELL + dx).min(last)];
+        }
     }
-    if n < LEAST_SAMPLES { f32::NAN } else { sorted[n / 2] }
+    let mut n = [0_u32; LANES];
+    for sample in &mut sorted {
+        for (d, n) in sample.iter_mut().zip(&mut n) {
+            *n += u32::from(!d.is_nan());
+            *d = if d.is_nan() { f32::INFINITY } else { *d };
+        }
+    }
+    for (i, j) in EXCHANGES {
+        let (low, high) = sorted.split_at_mut(j);
+        for (low, high) in low[i].iter_mut().zip(&mut high[0]) {
+            (*low, *high) = (low.min(*high), low.max(*high));
+        }
+    }
+    for (cell, median) in medians.iter_mut().enumerate() {
+        let n = n[cell] as usize;
+        *median = if n < LEAST_SAMPLES { f32::NAN } else { sorted[n / 2][cell] };
+    }
 }
 
 #[cfg(test)]
@@ -199,24 +283,27 @@ mod tests {
 
     #[test]
     fn the_median_is_that_of_the_samples_that_there_are() {
-        // Every pattern of holes, in several orders of the values.
+        // Every pattern of holes, in each cell another order of the values.
         for holes in 0_u32..256 {
-            for turn in 0..8 {
-                let mut values = [[0.0_f32; CELL]; CELL];
-                let mut kept = Vec::new();
+            let mut values = [[0.0_f32; LANES * CELL]; CELL];
+            let mut kept = [(); LANES].map(|()| Vec::new());
+            for (turn, kept) in kept.iter_mut().enumerate() {
                 for (i, (x, y)) in SAMPLES.into_iter().enumerate() {
                     let hole = holes >> i & 1 == 1;
                     let value = ((i * 5 + turn * 3) % 8) as f32;
-                    values[y][x] = if hole { f32::NAN } else { value };
+                    values[y][turn * CELL + x] = if hole { f32::NAN } else { value };
                     kept.extend((!hole).then_some(value));
                 }
                 kept.sort_by(f32::total_cmp);
-                let rows: [&[f32]; CELL] = std::array::from_fn(|y| &values[y][..]);
-                let found = median(&rows, 0, CELL - 1);
+            }
+            let rows: [&[f32]; CELL] = std::array::from_fn(|y| &values[y][..]);
+            let mut found = [0.0; LANES];
+            medians_of(&rows, 0, &mut found);
+            for (kept, found) in kept.iter().zip(found) {
                 if kept.len() < LEAST_SAMPLES {
                     assert!(found.is_nan());
                 } else {
-                    assert_eq!(found.to_bits(), kept[kept.len() / 2].to_bits(), "{holes:b} {turn}");
+                    assert_eq!(found.to_bits(), kept[kept.len() / 2].to_bits(), "{holes:b}");
                 }
             }
         }

@@ -28,6 +28,7 @@ const MAX_HOLES: usize = 2;
 #[derive(Debug, Default)]
 pub struct Join {
     sets: UnionFind,
+    places: Vec<Place>,
     strong: Vec<bool>,
     widths: Vec<u32>,
     links: Vec<u64>,
@@ -40,11 +41,13 @@ impl Join {
     /// pieces are short: they take a thing, but never make one of two.
     pub fn run(&mut self, columns: &Columns, scale: f32, rig: &StereoRig) {
         let view = View::new(scale, rig);
+        self.places.clear();
+        self.places.extend(columns.segments.iter().map(|s| view.place(s)));
         self.strong.clear();
         let least = STRONG_M * scale;
-        self.strong.extend(columns.segments.iter().map(|s| {
+        self.strong.extend(columns.segments.iter().zip(&self.places).map(|(s, place)| {
             let rows = (s.lower - s.upper) as f32 * CELL as f32;
-            rows * view.distance(s) >= least * view.focal
+            rows * place.distance >= least * view.focal
         }));
         self.sets.reset(columns.segments.len());
         self.beside(columns, &view);
@@ -54,13 +57,14 @@ impl Join {
 
     /// Strong segments side by side.
     fn beside(&mut self, columns: &Columns, view: &View) {
-        let Columns { segments, first } = columns;
-        for (i, s) in segments.iter().enumerate().filter(|(i, _)| self.strong[*i]) {
-            let column = s.x as usize;
-            let reach = view.columns(GAP_M, s);
+        let first = &columns.first;
+        for (i, place) in self.places.iter().enumerate().filter(|(i, _)| self.strong[*i]) {
+            let column = place.x as usize;
+            let reach = view.columns(GAP_M, place);
             let from = first[column.saturating_sub(reach)] as usize;
-            for j in (from..first[column] as usize).filter(|j| self.strong[*j]) {
-                if view.beside(s, &segments[j]) {
+            let others = from..first[column] as usize;
+            for (j, other) in others.clone().zip(&self.places[others]) {
+                if self.strong[j] && view.beside(place, other) {
                     self.sets.union(j as u32, i as u32);
                 }
             }
@@ -110,13 +114,17 @@ impl Join {
             let from = first[column.saturating_sub(1)] as usize;
             let to = first[(column + 2).min(first.len() - 1)] as usize;
             for (j, t) in (from..to).zip(&segments[from..to]) {
-                let step = (view.distance(s) - view.distance(t)).abs();
+                let (place, other) = (&self.places[i], &self.places[j]);
+                let step = (place.distance - other.distance).abs();
+                if j == i || step >= best.0 || !(self.strong[j] || j < i) {
+                    continue;
+                }
                 let touches = if t.x == s.x {
                     view.above(s, t) || view.above(t, s)
                 } else {
-                    view.beside(s, t)
+                    view.beside(place, other)
                 };
-                if j != i && step < best.0 && (self.strong[j] || j < i) && touches {
+                if touches {
                     best = (step, Some(j));
                 }
             }
@@ -130,6 +138,16 @@ impl Join {
     pub fn set_of(&mut self, segment: u32) -> u32 {
         self.sets.find(segment)
     }
+}
+
+/// Where a segment is.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    x: u32,
+    upper: u32,
+    lower: u32,
+    /// Along the optical axis, metres.
+    distance: f32,
 }
 
 /// What is needed to reckon with segments in space.
@@ -155,17 +173,21 @@ impl View {
         self.depth_scale / s.disparity()
     }
 
+    fn place(&self, s: &Segment) -> Place {
+        Place { x: s.x, upper: s.upper, lower: s.lower, distance: self.distance(s) }
+    }
+
     /// Columns of cells across `length_m` metres of a road scene at a segment.
-    fn columns(&self, length_m: f32, s: &Segment) -> usize {
-        (length_m * self.scale * self.focal / self.distance(s) / CELL as f32) as usize + 1
+    fn columns(&self, length_m: f32, s: &Place) -> usize {
+        (length_m * self.scale * self.focal / s.distance / CELL as f32) as usize + 1
     }
 
     /// Whether segments of different columns are one surface.
-    fn beside(&self, s: &Segment, t: &Segment) -> bool {
+    fn beside(&self, s: &Place, t: &Place) -> bool {
         if s.lower.min(t.lower) <= s.upper.max(t.upper) {
             return false;
         }
-        let (zs, zt) = (self.distance(s), self.distance(t));
+        let (zs, zt) = (s.distance, t.distance);
         let (near, far) = (zs.min(zt), zs.max(zt));
         // d Z = Z² / (f B) d d
         let noise = STEP_PX * far * far / self.depth_scale;
@@ -183,7 +205,7 @@ impl View {
     }
 
     /// Columns from the principal point, pixels.
-    fn offset(&self, s: &Segment) -> f32 {
+    fn offset(&self, s: &Place) -> f32 {
         (s.x as usize * CELL) as f32 + 1.5 - self.cx
     }
 

@@ -1,0 +1,196 @@
+//! Sums over the pixels of one region, sixteen at a time.
+
+use crate::image::Image;
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::stage::regions::RegionSource;
+use crate::stage::regions::components::PixelBox;
+
+/// Pixels that are added at once, whatever the level: the order of the
+/// additions, and so the last bit of a sum, is the same everywhere.
+const LANES: usize = 16;
+/// Rows whose sums are kept in single precision.
+const ROWS: usize = 32;
+
+/// Where things are about: sums of differences from here keep their precision
+/// in few bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Centre {
+    /// Disparity in pixels.
+    pub disparity: f32,
+    /// Depth in metres.
+    pub depth: f32,
+    /// Column.
+    pub u: f32,
+    /// Row.
+    pub v: f32,
+    /// Largest difference from `disparity` of a pixel that counts for the position.
+    pub tolerance: f32,
+}
+
+/// Sums over the pixels of a region; d, z, u and v are differences from the [`Centre`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sums {
+    /// Number of pixels, of those with disparity, with finite depth, and of
+    /// those that count for the position.
+    pub area: f64,
+    pub valid: f64,
+    pub finite: f64,
+    pub inliers: f64,
+    /// Over all pixels.
+    pub saliency: f64,
+    pub max_saliency: f32,
+    /// Over those with disparity.
+    pub confidence: f64,
+    pub disparity: [f64; 2],
+    /// Over those with finite depth: z and z².
+    pub depth: [f64; 2],
+    /// Over those that count for the position: (u, u²), (v, v²), (d, d²).
+    pub place: [[f64; 2]; 3],
+    /// Over the same: Z, u Z, v Z, with the depth Z itself.
+    pub weighted: [f64; 3],
+}
+
+impl Sums {
+    /// Of the pixels in `bounds` whose id is `id`; their mask of `bounds` (255
+    /// inside, else 0) is written to `mask`, row by row.
+    pub fn of(
+        level: Level,
+        id: u32,
+        bounds: &PixelBox,
+        ids: &Image<u32>,
+        source: &RegionSource<'_>,
+        centre: &Centre,
+        mask: &mut [u8],
+    ) -> Self {
+        let mut sums = Self::default();
+        for upper in (bounds.y0..bounds.y1).step_by(ROWS) {
+            let rows = PixelBox { y0: upper, y1: (upper + ROWS).min(bounds.y1), ..*bounds };
+            let at = (upper - bounds.y0) * bounds.width();
+            let mask = &mut mask[at..at + rows.height() * rows.width()];
+            dispatch!(level, simd => sums.add(simd, id, &rows, ids, source, centre, mask));
+        }
+        sums
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "a kernel: structs of slices would hide them")]
+    fn add<S: Simd>(
+        &mut self,
+        simd: S,
+        id: u32,
+        rows: &PixelBox,
+        ids: &Image<u32>,
+        source: &RegionSource<'_>,
+        centre: &Centre,
+        mask: &mut [u8],
+    ) {
+        let zero = f32x16::splat(simd, 0.0);
+        let one = f32x16::splat(simd, 1.0);
+        let most = f32x16::splat(simd, f32::MAX);
+        let own = u32x16::splat(simd, id);
+        let [mut area, mut valid, mut finite, mut inliers] = [zero; 4];
+        let [mut saliency, mut max_saliency, mut confidence] = [zero; 3];
+        let [mut d1, mut d2, mut z1, mut z2] = [zero; 4];
+        let [mut u1, mut u2, mut v1, mut v2, mut e1, mut e2] = [zero; 6];
+        let [mut w, mut uw, mut vw] = [zero; 3];
+        let lane = f32x16::from_fn(simd, |i| i as f32);
+        for (y, mask) in (rows.y0..rows.y1).zip(mask.chunks_exact_mut(rows.width())) {
+            let v = f32x16::splat(simd, y as f32 - centre.v);
+            let [s_row, c_row, d_row, z_row] =
+                [source.saliency, source.confidence, source.disparity, source.depth]
+                    .map(|m| m.row(y));
+            let id_row = ids.row(y);
+            for (x, mask) in (rows.x0..).step_by(LANES).zip(mask.chunks_mut(LANES)) {
+                // Beyond the box there is no pixel of this id.
+                let at = load(id_row, x);
+                let inside = u32x16::from_slice(simd, &at).simd_eq(own);
+                if inside.to_bitmask() == 0 {
+                    continue;
+                }
+                if let Some(mask) = mask.first_chunk_mut::<LANES>() {
+                    for i in 0..LANES {
+                        mask[i] = if at[i] == id { 255 } else { 0 };
+                    }
+                } else {
+                    for (mask, at) in mask.iter_mut().zip(at) {
+                        *mask = if at == id { 255 } else { 0 };
+                    }
+                }
+                let s = inside.select(f32x16::from_slice(simd, &load(s_row, x)), zero);
+                let c = f32x16::from_slice(simd, &load(c_row, x));
+                let d = f32x16::from_slice(simd, &load(d_row, x));
+                let z = f32x16::from_slice(simd, &load(z_row, x));
+                area += inside.select(one, zero);
+                saliency += s;
+                max_saliency = max_saliency.max(s);
+
+                let known = inside & d.simd_eq(d);
+                let d = known.select(d - centre.disparity, zero);
+                valid += known.select(one, zero);
+                confidence += known.select(c, zero);
+                d1 += d;
+                d2 += d * d;
+
+                let near = inside & z.abs().simd_le(most);
+                let dz = near.select(z - centre.depth, zero);
+                finite += near.select(one, zero);
+                z1 += dz;
+                z2 += dz * dz;
+
+                let counts = near & d.abs().simd_le(f32x16::splat(simd, centre.tolerance));
+                let z = counts.select(z, zero);
+                let n = counts.select(one, zero);
+                let u = n * (lane + (x as f32 - centre.u));
+                let d = n * d;
+                inliers += n;
+                u1 += u;
+                u2 += u * u;
+                v1 += n * v;
+                v2 += n * v * v;
+                e1 += d;
+                e2 += d * d;
+                w += z;
+                uw += u * z;
+                vw += v * z;
+            }
+        }
+        self.area += total(area);
+        self.valid += total(valid);
+        self.finite += total(finite);
+        self.inliers += total(inliers);
+        self.saliency += total(saliency);
+        self.confidence += total(confidence);
+        for value in max_saliency.as_slice() {
+            self.max_saliency = self.max_saliency.max(*value);
+        }
+        add(&mut self.disparity, [d1, d2]);
+        add(&mut self.depth, [z1, z2]);
+        add(&mut self.place[0], [u1, u2]);
+        add(&mut self.place[1], [v1, v2]);
+        add(&mut self.place[2], [e1, e2]);
+        add(&mut self.weighted, [w, uw, vw]);
+    }
+}
+
+/// The values from column `x` on; zeros beyond the end of the row.
+#[inline(always)]
+fn load<T: Copy + Default>(row: &[T], x: usize) -> [T; LANES] {
+    if let Some(values) = row[x..].first_chunk() {
+        return *values;
+    }
+    let mut values = [T::default(); LANES];
+    values[..row.len() - x].copy_from_slice(&row[x..]);
+    values
+}
+
+#[inline(always)]
+fn total<S: Simd>(lanes: f32x16<S>) -> f64 {
+    lanes.as_slice().iter().map(|v| f64::from(*v)).sum()
+}
+
+#[inline(always)]
+fn add<S: Simd, const N: usize>(sums: &mut [f64; N], lanes: [f32x16<S>; N]) {
+    for (sum, lanes) in sums.iter_mut().zip(lanes) {
+        *sum += total(lanes);
+    }
+}
