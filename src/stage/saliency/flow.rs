@@ -16,6 +16,7 @@ const LEVELS: usize = 3;
 const STEP: usize = 4;
 /// Side of a block in pixels: blocks overlap by half.
 const BLOCK: usize = 8;
+const AREA: f32 = (BLOCK * BLOCK) as f32;
 /// Search at the coarsest level in its pixels, to each side: with one more
 /// pixel at each finer level, 15 cells or 60 full-size pixels in all.
 const REACH: i32 = 3;
@@ -98,13 +99,16 @@ impl Flow {
             }
             upsample(&self.block, size, out);
         }
-        for y in 0..grid.height() {
-            for (x, value) in self.block.row_mut(y).iter_mut().enumerate() {
-                let cost = cost(&self.now[0], &self.before[0], (x, y), grid.get(x, y));
-                let mean = cost.unwrap_or(0) as f32 / (BLOCK * BLOCK) as f32;
-                *value = (1.0 - (mean - SURE) / FADE).clamp(0.0, 1.0);
+        let (now, before, trust) = (&self.now[0], &self.before[0], &mut self.block);
+        dispatch!(self.level, _simd => {
+            for y in 0..grid.height() {
+                for (x, value) in trust.row_mut(y).iter_mut().enumerate() {
+                    let cost = cost(now, before, (x, y), grid.get(x, y));
+                    let mean = cost.unwrap_or(0) as f32 / AREA;
+                    *value = (1.0 - (mean - SURE) / FADE).clamp(0.0, 1.0);
+                }
             }
-        }
+        });
         upsample(&self.block, size, &mut self.trust);
     }
 
@@ -133,23 +137,22 @@ fn sharpened(
     block: (usize, usize),
     best: [i32; 2],
 ) -> BlockShift {
-    let mean = |shift| cost(now, before, block, shift).map(|c| c as f32 / (BLOCK * BLOCK) as f32);
     let mut out = BlockShift { shift: best.map(|shift| shift as f32), firmness: 0.0 };
-    let Some(lowest) = mean(best) else { return out };
+    let Some(lowest) = cost(now, before, block, best) else { return out };
     let mut rises = 0.0;
     for axis in 0..2 {
-        let step = |by: i32| {
-            let mut shift = best;
-            shift[axis] += by;
-            mean(shift)
-        };
-        let (less, more) = (step(-1), step(1));
-        let rise = less.unwrap_or(lowest).max(more.unwrap_or(lowest)) - lowest;
-        rises += rise.max(0.0);
+        let (mut back, mut on) = (best, best);
+        back[axis] -= 1;
+        on[axis] += 1;
+        let (less, more) = (cost(now, before, block, back), cost(now, before, block, on));
+        let most = less.unwrap_or(lowest).max(more.unwrap_or(lowest));
+        let rise = most.saturating_sub(lowest) as f32 / AREA;
+        rises += rise;
         if let (Some(less), Some(more)) = (less, more)
             && rise >= LEAST_RISE
         {
-            out.shift[axis] += ((less - more) / (2.0 * rise)).clamp(-0.5, 0.5);
+            let slope = (less as f32 - more as f32) / AREA;
+            out.shift[axis] += (slope / (2.0 * rise)).clamp(-0.5, 0.5);
         }
     }
     out.firmness = (rises / FIRM_RISE).min(1.0);
@@ -176,43 +179,56 @@ fn refine(
                 let v = (y / 2).min(coarser.height() - 1);
                 coarser.get(u, v).map(|shift| 2 * shift)
             };
-            let mut best = Best { shift: guess, cost: u32::MAX };
-            let mut consider = |shift: [i32; 2]| {
-                if let Some(cost) = cost(now, before, (x, y), shift) {
-                    let off = shift[0].abs_diff(guess[0]) + shift[1].abs_diff(guess[1]);
-                    best.improve(shift, cost + STIFFNESS * off);
-                }
-            };
-            consider(guess);
-            consider([0, 0]);
-            if x > 0 {
-                consider(shifts.get(x - 1, y));
+            let mut search = Search { now, before, block: (x, y), guess, best: guess, cost: u32::MAX };
+            search.consider(guess);
+            let left = if x > 0 { shifts.get(x - 1, y) } else { guess };
+            let above = if y > 0 { shifts.get(x, y - 1) } else { guess };
+            // Often the same: nothing is weighed twice.
+            let still = [0, 0];
+            if still != guess {
+                search.consider(still);
             }
-            if y > 0 {
-                consider(shifts.get(x, y - 1));
+            if left != guess && left != still {
+                search.consider(left);
+            }
+            if above != guess && above != still && above != left {
+                search.consider(above);
             }
             for dy in -reach..=reach {
                 for dx in -reach..=reach {
+                    let shift = [guess[0] + dx, guess[1] + dy];
                     // At the finer levels a step along one axis at a time.
-                    if coarsest || dx * dy == 0 {
-                        consider([guess[0] + dx, guess[1] + dy]);
+                    let step = shift != guess && (coarsest || dx * dy == 0);
+                    if step && shift != still && shift != left && shift != above {
+                        search.consider(shift);
                     }
                 }
             }
-            shifts.set(x, y, best.shift);
+            shifts.set(x, y, search.best);
         }
     }
 }
 
-struct Best {
-    shift: [i32; 2],
+/// The search for one block's place. (Methods and no closures, which would be
+/// compiled without the wide instructions.)
+struct Search<'a> {
+    now: &'a Image<u8>,
+    before: &'a Image<u8>,
+    block: (usize, usize),
+    guess: [i32; 2],
+    best: [i32; 2],
     cost: u32,
 }
 
-impl Best {
-    fn improve(&mut self, shift: [i32; 2], cost: u32) {
-        if cost < self.cost {
-            *self = Self { shift, cost };
+impl Search<'_> {
+    #[inline(always)]
+    fn consider(&mut self, shift: [i32; 2]) {
+        if let Some(cost) = cost(self.now, self.before, self.block, shift) {
+            let off = shift[0].abs_diff(self.guess[0]) + shift[1].abs_diff(self.guess[1]);
+            let cost = cost + STIFFNESS * off;
+            if cost < self.cost {
+                (self.best, self.cost) = (shift, cost);
+            }
         }
     }
 }
@@ -248,16 +264,15 @@ fn cost(
     let (x, u) = place(block.0, now.width(), shift[0])?;
     let (y, v) = place(block.1, now.height(), shift[1])?;
     let (now, before) = (&now.pixels()[y * width + x..], &before.pixels()[v * width + u..]);
-    // One sum per column of the block: the columns are added side by side.
-    let mut sums = [0_u16; BLOCK];
+    let mut sum = 0;
     for row in 0..BLOCK {
         let a = now[row * width..].first_chunk::<BLOCK>()?;
         let b = before[row * width..].first_chunk::<BLOCK>()?;
         for i in 0..BLOCK {
-            sums[i] += u16::from(a[i].abs_diff(b[i]));
+            sum += u32::from(a[i].abs_diff(b[i]));
         }
     }
-    Some(sums.iter().map(|&sum| u32::from(sum)).sum())
+    Some(sum)
 }
 
 /// Median over 3x3 blocks, each axis by itself; beyond the edge the outermost
