@@ -4,6 +4,11 @@
 //! quarter-size view of the left image is made once per frame and shared by
 //! every cue. The map is smoothed over time and brought to full size at the end.
 
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
 pub mod barrier;
 pub mod beside;
 pub mod boundary;
@@ -33,7 +38,7 @@ use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
 use crate::perception::View;
-use crate::simd::Level;
+use crate::simd::{Level, dispatch};
 use crate::stage::coarse::{CELL, CoarseDisparity};
 use crate::stage::ground::Ground;
 use crate::stamp::Stamp;
@@ -215,7 +220,8 @@ impl Saliency {
             Mode::FullFrame => {}
         }
         if let Some(before) = before.filter(|_| self.smoothing > 0.0) {
-            smooth(attention, &before.attention, &self.flow, self.smoothing);
+            let (flow, share) = (&self.flow, self.smoothing);
+            dispatch!(self.level, _simd => smooth(attention, &before.attention, flow, share));
         }
         previous.set(scene.stamp, &self.cells.gray, attention);
         upsample(attention, self.size, saliency);
@@ -225,24 +231,31 @@ impl Saliency {
 /// (1 - a) of this frame's map and a of the one before, the latter read where
 /// each cell was then. What was not seen before has no past: there `a` fades
 /// with the flow's trust, so that a new thing is attended to at once.
+#[inline(always)]
 fn smooth(attention: &mut Image<f32>, before: &Image<f32>, flow: &Flow, share: f32) {
     for y in 0..attention.height() {
-        let (dx, dy, trust) = (flow.dx.row(y), flow.dy.row(y), flow.trust.row(y));
-        for (x, now) in attention.row_mut(y).iter_mut().enumerate() {
-            let before = sample(before, x as f32 + dx[x], y as f32 + dy[x]);
-            *now += share * trust[x] * (before - *now);
+        let shifts = flow.dx.row(y).iter().zip(flow.dy.row(y)).zip(flow.trust.row(y));
+        for (x, (now, ((dx, dy), trust))) in attention.row_mut(y).iter_mut().zip(shifts).enumerate()
+        {
+            let before = sample(before, x as f32 + dx, y as f32 + dy);
+            *now += share * trust * (before - *now);
         }
     }
 }
 
 /// Bilinear value at `(x, y)`, coordinates limited to the image.
+#[inline(always)]
 fn sample(image: &Image<f32>, x: f32, y: f32) -> f32 {
-    let x = x.clamp(0.0, (image.width() - 1) as f32);
-    let y = y.clamp(0.0, (image.height() - 1) as f32);
+    let Size { width, height } = image.size();
+    let x = x.clamp(0.0, (width - 1) as f32);
+    let y = y.clamp(0.0, (height - 1) as f32);
     let (x0, y0) = (x as usize, y as usize);
-    let (x1, y1) = ((x0 + 1).min(image.width() - 1), (y0 + 1).min(image.height() - 1));
     let (fx, fy) = (x - x0 as f32, y - y0 as f32);
-    let upper = image.get(x0, y0) + fx * (image.get(x1, y0) - image.get(x0, y0));
-    let lower = image.get(x0, y1) + fx * (image.get(x1, y1) - image.get(x0, y1));
+    let pixels = image.pixels();
+    let (right, below) = (usize::from(x0 + 1 < width), usize::from(y0 + 1 < height) * width);
+    let at = y0 * width + x0;
+    let upper = pixels[at] + fx * (pixels[at + right] - pixels[at]);
+    let at = at + below;
+    let lower = pixels[at] + fx * (pixels[at + right] - pixels[at]);
     upper + fy * (lower - upper)
 }

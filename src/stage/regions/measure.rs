@@ -20,7 +20,7 @@ const BOUNDARY_PX: f64 = 0.5;
 /// Neighbouring pixels share their matching window: this many count as one.
 const PIXELS_PER_SAMPLE: f64 = 25.0;
 /// Values of which percentiles are taken, about.
-const MOST_VALUES: usize = 2048;
+const MOST_VALUES: usize = 1024;
 /// Columns by which the sample of a row lies beside that of the row above: a
 /// number that shares no factor with a usual step.
 const SHIFT: usize = 7;

@@ -1,11 +1,17 @@
 //! What moves by itself: the flow that the camera's own motion does not explain.
 
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
 use nalgebra::{SMatrix, SVector};
 
 use crate::image::Image;
+use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CELL;
 use crate::stage::saliency::AttentionScene;
-use crate::stage::saliency::flow::{BlockShift, Flow};
+use crate::stage::saliency::flow::Flow;
 use crate::stage::saliency::upsample::upsample;
 
 /// Unknowns of the camera's motion.
@@ -33,19 +39,25 @@ const PER_METRE: f32 = 10.0;
 type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Unknowns = SVector<f64, UNKNOWNS>;
 
-/// Equations of one block: the shift it has for each unknown at 1, in cells.
-#[derive(Clone, Copy, Debug)]
+/// Blocks whose equations stand side by side.
+const LANES: usize = 8;
+type Lanes = [f32; LANES];
+
+/// Equations of eight blocks: the shift that each has for each unknown at 1,
+/// in cells. What is left over in the last ones has firmness 0.
+#[derive(Clone, Copy, Debug, Default)]
 struct Equations {
-    rows: [[f32; UNKNOWNS]; 2],
-    shift: [f32; 2],
-    firmness: f32,
+    rows: [[Lanes; UNKNOWNS]; 2],
+    shift: [Lanes; 2],
+    firmness: Lanes,
 }
 
 /// The camera's motion and what is left, with the buffers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct EgoMotion {
+    level: Level,
     equations: Vec<Equations>,
-    residuals: Vec<f32>,
+    residuals: Vec<Lanes>,
     ranked: Vec<f32>,
     blocks: Image<f32>,
     /// `C_M` per cell, 0..=1.
@@ -55,6 +67,19 @@ pub struct EgoMotion {
 }
 
 impl EgoMotion {
+    /// The cue with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self {
+            level,
+            equations: Vec::new(),
+            residuals: Vec::new(),
+            ranked: Vec::new(),
+            blocks: Image::default(),
+            motion: Image::default(),
+            most: 0.0,
+        }
+    }
+
     /// Fills [`EgoMotion::motion`] with
     /// `C_M` = 1 − exp(−(r / (3 max(s, ¼)))² / 2), r being the length of a
     /// block's shift less what the camera's motion makes of it, s its spread
@@ -70,20 +95,23 @@ impl EgoMotion {
             return false;
         }
         self.write_equations(flow, scene, has_depth);
-        if self.equations.iter().filter(|e| e.firmness > FIRM).count() < LEAST_BLOCKS {
+        let firm = flow.blocks.pixels().iter().filter(|block| block.firmness > FIRM);
+        if firm.count() < LEAST_BLOCKS {
             return false;
         }
         let mut spread = FIRST_SPREAD;
         let mut found = Unknowns::zeros();
+        self.residuals_of(&found);
         for _ in 0..STEPS {
-            let Some(next) = self.solve(&found, spread) else { return false };
+            let Some(next) = self.solve(spread) else { return false };
             found = next;
             spread = self.residuals_of(&found).max(LEAST_SPREAD);
         }
         self.blocks.resize(flow.blocks.size());
+        let residuals = self.residuals.as_flattened();
         let blocks = self.blocks.pixels_mut().iter_mut();
-        for ((out, e), r) in blocks.zip(&self.equations).zip(&self.residuals) {
-            *out = e.firmness * (1.0 - (-0.5 * (r / (3.0 * spread)).powi(2)).exp());
+        for ((out, block), r) in blocks.zip(flow.blocks.pixels()).zip(residuals) {
+            *out = block.firmness * (1.0 - (-0.5 * (r / (3.0 * spread)).powi(2)).exp());
         }
         self.ranked.clear();
         self.ranked.extend_from_slice(self.blocks.pixels());
@@ -105,73 +133,122 @@ impl EgoMotion {
         let per_pixel = PER_METRE / scene.rig.depth_scale() as f32;
         let cell = CELL as f32;
         self.equations.clear();
-        for y in 0..flow.blocks.height() {
-            for x in 0..flow.blocks.width() {
-                let block = flow.blocks.get(x, y);
-                // Its middle, to a cell.
-                let u = (x * CELL + CELL / 2).min(filled.width() - 1);
-                let v = (y * CELL + CELL / 2).min(filled.height() - 1);
-                let (a, b) = ((u as f32 * cell - cx) / fx, (v as f32 * cell - cy) / fy);
-                let (f, g) = (fx / cell, fy / cell);
-                let rows = if has_depth {
-                    let near = (filled.get(u, v) - offset).max(0.0) * per_pixel;
-                    [
-                        [-near, 0.0, a * near, a * b, -(1.0 + a * a), b].map(|e| e * f),
-                        [0.0, -near, b * near, 1.0 + b * b, -a * b, -a].map(|e| e * g),
-                    ]
-                } else {
-                    [[1.0, a, b, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0, a, b]]
-                };
-                let BlockShift { shift, firmness } = block;
-                self.equations.push(Equations { rows, shift, firmness });
+        self.equations.resize(flow.blocks.size().area().div_ceil(LANES), Equations::default());
+        let places =
+            (0..flow.blocks.height()).flat_map(|y| (0..flow.blocks.width()).map(move |x| (x, y)));
+        for (i, ((x, y), block)) in places.zip(flow.blocks.pixels()).enumerate() {
+            // Its middle, to a cell.
+            let u = (x * CELL + CELL / 2).min(filled.width() - 1);
+            let v = (y * CELL + CELL / 2).min(filled.height() - 1);
+            let (a, b) = ((u as f32 * cell - cx) / fx, (v as f32 * cell - cy) / fy);
+            let (f, g) = (fx / cell, fy / cell);
+            let rows = if has_depth {
+                let near = (filled.get(u, v) - offset).max(0.0) * per_pixel;
+                [
+                    [-near, 0.0, a * near, a * b, -(1.0 + a * a), b].map(|e| e * f),
+                    [0.0, -near, b * near, 1.0 + b * b, -a * b, -a].map(|e| e * g),
+                ]
+            } else {
+                [[1.0, a, b, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0, a, b]]
+            };
+            let (e, lane) = (&mut self.equations[i / LANES], i % LANES);
+            for (to, from) in e.rows.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
+                to[lane] = *from;
             }
+            for (to, from) in e.shift.iter_mut().zip(block.shift) {
+                to[lane] = from;
+            }
+            e.firmness[lane] = block.firmness;
         }
     }
 
-    /// One step of least squares with weights from the residuals of `last`.
-    fn solve(&self, last: &Unknowns, spread: f32) -> Option<Unknowns> {
-        let mut normal = [[0.0_f32; UNKNOWNS]; UNKNOWNS];
-        let mut right = [0.0_f32; UNKNOWNS];
-        for e in self.equations.iter().filter(|e| e.firmness > 0.0) {
-            let ratio = e.residual(last) / (3.0 * spread);
-            let weight = e.firmness * ((1.0 - ratio * ratio).max(0.0).powi(2) + OUTLIER);
-            for (row, shift) in e.rows.iter().zip(e.shift) {
-                for i in 0..UNKNOWNS {
-                    let weighted = weight * row[i];
-                    right[i] += weighted * shift;
-                    for j in 0..UNKNOWNS {
-                        normal[i][j] += weighted * row[j];
-                    }
-                }
+    /// One step of least squares with weights from the residuals.
+    fn solve(&self, spread: f32) -> Option<Unknowns> {
+        let mut sums = Sums::default();
+        let (equations, residuals) = (&self.equations, &self.residuals);
+        dispatch!(self.level, _simd => {
+            for (e, residuals) in equations.iter().zip(residuals) {
+                sums.add(e, residuals, spread);
             }
-        }
-        let mut normal = Normal::from_fn(|i, j| f64::from(normal[i][j]));
+        });
+        let total = |lanes: &Lanes| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        let mut normal = Normal::from_fn(|i, j| total(&sums.normal[i.min(j)][i.max(j)]));
         let ridge = RIDGE * normal.trace();
         normal += Normal::identity() * ridge;
-        let right = Unknowns::from_fn(|i, _| f64::from(right[i]));
+        let right = Unknowns::from_fn(|i, _| total(&sums.right[i]));
         normal.cholesky().map(|factor| factor.solve(&right))
     }
 
     /// Lengths of the residuals, and their spread over the firm blocks.
     fn residuals_of(&mut self, found: &Unknowns) -> f32 {
-        self.residuals.clear();
-        self.residuals.extend(self.equations.iter().map(|e| e.residual(found)));
+        let found = std::array::from_fn(|i| found[i] as f32);
+        self.residuals.resize(self.equations.len(), [0.0; LANES]);
+        let Self { level, equations, residuals, .. } = self;
+        dispatch!(*level, _simd => {
+            for (e, out) in equations.iter().zip(residuals.iter_mut()) {
+                e.residuals(&found, out);
+            }
+        });
         self.ranked.clear();
-        let firm = self.equations.iter().zip(&self.residuals).filter(|(e, _)| e.firmness > FIRM);
-        self.ranked.extend(firm.map(|(_, r)| r));
+        for (e, residuals) in self.equations.iter().zip(&self.residuals) {
+            let firm = e.firmness.iter().zip(residuals).filter(|(firmness, _)| **firmness > FIRM);
+            self.ranked.extend(firm.map(|(_, r)| r));
+        }
         let middle = self.ranked.len() / 2;
         RAYLEIGH * *self.ranked.select_nth_unstable_by(middle, f32::total_cmp).1
     }
 }
 
 impl Equations {
-    /// Length of what is left of the shift.
-    fn residual(&self, found: &Unknowns) -> f32 {
-        let mut squares = 0.0;
+    /// Lengths of what is left of the shifts.
+    #[inline(always)]
+    fn residuals(&self, found: &[f32; UNKNOWNS], out: &mut Lanes) {
+        let mut squares = [0.0; LANES];
         for (row, shift) in self.rows.iter().zip(self.shift) {
-            let model: f32 = row.iter().zip(found.iter()).map(|(e, x)| e * *x as f32).sum();
-            squares += (shift - model).powi(2);
+            let mut left = shift;
+            for (coefficients, found) in row.iter().zip(found) {
+                for (left, coefficient) in left.iter_mut().zip(coefficients) {
+                    *left -= coefficient * found;
+                }
+            }
+            for (squares, left) in squares.iter_mut().zip(left) {
+                *squares += left * left;
+            }
         }
-        squares.sqrt()
+        *out = squares.map(f32::sqrt);
+    }
+}
+
+/// The normal equations, summed in lanes; of the matrix, its upper half.
+#[derive(Default)]
+struct Sums {
+    normal: [[Lanes; UNKNOWNS]; UNKNOWNS],
+    right: [Lanes; UNKNOWNS],
+}
+
+impl Sums {
+    #[inline(always)]
+    #[expect(clippy::needless_range_loop, reason = "lanes by their number become one vector")]
+    fn add(&mut self, e: &Equations, residuals: &Lanes, spread: f32) {
+        let mut weight = [0.0; LANES];
+        for i in 0..LANES {
+            let ratio = residuals[i] / (3.0 * spread);
+            let inlier = (1.0 - ratio * ratio).max(0.0);
+            weight[i] = e.firmness[i] * (inlier * inlier + OUTLIER);
+        }
+        for axis in 0..2 {
+            for a in 0..UNKNOWNS {
+                let mut weighted = e.rows[axis][a];
+                for i in 0..LANES {
+                    weighted[i] *= weight[i];
+                    self.right[a][i] += weighted[i] * e.shift[axis][i];
+                }
+                for b in a..UNKNOWNS {
+                    for i in 0..LANES {
+                        self.normal[a][b][i] += weighted[i] * e.rows[axis][b][i];
+                    }
+                }
+            }
+        }
     }
 }

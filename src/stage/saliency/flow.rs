@@ -179,7 +179,8 @@ fn refine(
                 let v = (y / 2).min(coarser.height() - 1);
                 coarser.get(u, v).map(|shift| 2 * shift)
             };
-            let mut search = Search { now, before, block: (x, y), guess, best: guess, cost: u32::MAX };
+            let mut search =
+                Search { now, before, block: (x, y), guess, best: guess, cost: u32::MAX };
             search.consider(guess);
             let left = if x > 0 { shifts.get(x - 1, y) } else { guess };
             let above = if y > 0 { shifts.get(x, y - 1) } else { guess };

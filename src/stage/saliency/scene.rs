@@ -39,7 +39,7 @@ impl SceneSaliency {
         Self {
             ground: Ground::default(),
             barrier: Barrier::new(level),
-            ego: EgoMotion::default(),
+            ego: EgoMotion::new(level),
             on_plane: OnPlane::new(level),
             without_plane: WithoutPlane::default(),
             fourth: Image::default(),
