@@ -197,12 +197,21 @@ impl Saliency {
         shrink_view(self.level, scene.left, &mut self.cells);
         let before = previous.get(cells);
         let compensates = matches!(self.mode, Mode::Scene(_));
-        if let Some(before) = before.filter(|_| compensates || self.smoothing > 0.0) {
-            self.flow.run(&before.gray, &self.cells.gray);
-            if compensates {
-                self.flow.sharpen();
+        let Self { mode, flow, cells: view, .. } = self;
+        let match_blocks = || {
+            if let Some(before) = before.filter(|_| compensates || self.smoothing > 0.0) {
+                flow.run(&before.gray, &view.gray);
+                if compensates {
+                    flow.sharpen();
+                }
             }
-        }
+        };
+        let prepare = || {
+            if let Mode::Scene(mode) = mode {
+                mode.prepare(scene, view, before.is_none());
+            }
+        };
+        rayon::join(match_blocks, prepare);
         let scene = AttentionScene {
             stamp: scene.stamp,
             left: scene.left,

@@ -7,10 +7,11 @@
 mod on_plane;
 mod without_plane;
 
-use super::AttentionScene;
+use super::{AttentionScene, Scene};
 use super::barrier::Barrier;
 use super::ego::EgoMotion;
 use crate::image::Image;
+use crate::perception::View;
 use crate::simd::Level;
 use crate::stage::ground::Ground;
 
@@ -53,14 +54,19 @@ impl SceneSaliency {
         &self.ground
     }
 
-    /// Writes S per cell.
-    pub fn run(&mut self, scene: &AttentionScene<'_>, out: &mut Image<f32>) {
-        if scene.previous.is_none() {
+    /// What needs no flow, so that it can run beside it: the ground, which is
+    /// searched anew when the frame is the `first` one, and the barriers.
+    pub fn prepare(&mut self, scene: &Scene<'_>, cells: &View, first: bool) {
+        if first {
             self.ground.reset();
         }
         self.ground.run(&scene.coarse.checked, scene.rig);
-        self.scale_disparity(scene);
-        self.barrier.run(&scene.cells.rgb, &self.fourth, &mut self.color, &mut self.relief);
+        self.scale_disparity(&scene.coarse.filled);
+        self.barrier.run(&cells.rgb, &self.fourth, &mut self.color, &mut self.relief);
+    }
+
+    /// Writes S per cell, after [`SceneSaliency::prepare`].
+    pub fn run(&mut self, scene: &AttentionScene<'_>, out: &mut Image<f32>) {
         let measured = scene.coarse.checked.pixels().iter().filter(|d| **d >= 1.0).count();
         let has_depth = measured as f32 >= LEAST_MEASURED * out.size().area() as f32;
         let motion = match scene.flow {
@@ -77,8 +83,7 @@ impl SceneSaliency {
     }
 
     /// Disparity as a byte, 0 at infinity and 255 at the largest one.
-    fn scale_disparity(&mut self, scene: &AttentionScene<'_>) {
-        let filled = &scene.coarse.filled;
+    fn scale_disparity(&mut self, filled: &Image<f32>) {
         let largest = filled.pixels().iter().fold(1.0_f32, |m, &d| m.max(d));
         self.fourth.resize(filled.size());
         for (out, &d) in self.fourth.pixels_mut().iter_mut().zip(filled.pixels()) {
