@@ -3,6 +3,7 @@
 pub mod coarse;
 pub mod depth;
 pub mod ground;
+mod per_thread;
 pub mod preprocess;
 pub mod refine;
 pub mod regions;

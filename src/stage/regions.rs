@@ -7,6 +7,8 @@ pub mod simplify;
 pub mod union_find;
 pub mod upright;
 
+use rayon::prelude::*;
+
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::{Image, Size};
@@ -14,6 +16,7 @@ use crate::perception::{Region, RegionList, Rejections, RoiMask};
 use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::ground::Plane;
+use crate::stage::per_thread::PerThread;
 use components::{Candidates, Components};
 use contour::Contour;
 use measure::{Evidence, Measure};
@@ -61,6 +64,7 @@ pub struct RegionSource<'a> {
 
 /// The region former.
 pub struct Regions {
+    level: Level,
     size: Size,
     min_area: usize,
     max_count: usize,
@@ -68,6 +72,15 @@ pub struct Regions {
     components: Components,
     upright: Upright,
     candidates: Candidates,
+    /// Ids of the candidates that are large enough, and what speaks for each.
+    ids: Vec<u32>,
+    evidence: Vec<Evidence>,
+    workers: PerThread<Worker>,
+}
+
+/// Measures and outlines one region after the other.
+#[derive(Debug)]
+struct Worker {
     measure: Measure,
     contour: Contour,
 }
@@ -76,6 +89,7 @@ impl Regions {
     /// The stage for images of `size`.
     pub fn new(config: &Config, size: Size, level: Level) -> Self {
         Self {
+            level,
             size,
             min_area: usize::try_from(config.regions.min_area).unwrap_or(1),
             max_count: usize::try_from(config.regions.max_count).unwrap_or(1),
@@ -83,8 +97,9 @@ impl Regions {
             components: Components::default(),
             upright: Upright::new(level),
             candidates: Candidates::default(),
-            measure: Measure::new(level),
-            contour: Contour::default(),
+            ids: Vec::new(),
+            evidence: Vec::new(),
+            workers: PerThread::new(),
         }
     }
 
@@ -104,20 +119,21 @@ impl Regions {
         } else {
             self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
         }
-        for (index, bounds) in self.candidates.boxes.iter().enumerate() {
+        self.ids.clear();
+        for (id, bounds) in (1..).zip(&self.candidates.boxes) {
             if bounds.area < self.min_area {
                 rejections.small_area += 1;
-                continue;
-            }
-            let id = index as u32 + 1;
-            let region = regions.push_empty();
-            let evidence = self.measure.run(id, bounds, &self.candidates.ids, source, region);
-            region.confidence = confidence(region);
-            if let Some(count) = refusal(&evidence, region, rejections) {
-                *count += 1;
-                regions.truncate(regions.len() - 1);
+            } else {
+                self.ids.push(id);
+                regions.push_empty();
             }
         }
+        self.measure(source, regions);
+        let mut evidence = self.evidence.iter();
+        regions.retain(|region| {
+            let count = evidence.next().and_then(|e| refusal(e, region, rejections));
+            count.map(|count| *count += 1).is_none()
+        });
         regions.sort_unstable_by(|a, b| {
             priority(b).total_cmp(&priority(a)).then((a.y, a.x).cmp(&(b.y, b.x)))
         });
@@ -126,12 +142,27 @@ impl Regions {
         self.label(labels, regions);
     }
 
+    /// Fills one region for each of `self.ids`, and what speaks for it.
+    fn measure(&mut self, source: &RegionSource<'_>, regions: &mut [Region]) {
+        let level = self.level;
+        self.workers.fit(|| Worker { measure: Measure::new(level), contour: Contour::default() });
+        self.evidence.resize(regions.len(), Evidence::default());
+        let Self { candidates, ids, evidence, workers, .. } = self;
+        let regions = regions.par_iter_mut().zip(evidence).zip(ids);
+        regions.for_each(|((region, evidence), &mut id)| {
+            let bounds = &candidates.boxes[id as usize - 1];
+            let measure = &mut workers.lock().measure;
+            *evidence = measure.run(id, bounds, &candidates.ids, source, region);
+            region.confidence = confidence(region);
+        });
+    }
+
     /// Numbers the regions in their order, in the label image too, and draws their contours.
     fn label(&mut self, labels: &mut Image<u16>, regions: &mut RegionList) {
         labels.resize(self.size);
         labels.fill(0);
-        for (index, region) in regions.iter_mut().enumerate() {
-            region.label = index as u16 + 1;
+        for (label, region) in (1..).zip(regions.iter_mut()) {
+            region.label = label;
             let (x, width) = (region.x as usize, region.width as usize);
             for (dy, mask) in region.mask.chunks_exact(width).enumerate() {
                 let row = &mut labels.row_mut(region.y as usize + dy)[x..x + width];
@@ -139,14 +170,13 @@ impl Regions {
                     *label = region.label;
                 }
             }
-            self.contour.run(
-                &region.mask,
-                width,
-                [region.x, region.y],
-                self.contour_tolerance,
-                &mut region.contour,
-            );
         }
+        let Self { workers, contour_tolerance, .. } = self;
+        regions.par_iter_mut().for_each(|region| {
+            let (width, origin) = (region.width as usize, [region.x, region.y]);
+            let contour = &mut workers.lock().contour;
+            contour.run(&region.mask, width, origin, *contour_tolerance, &mut region.contour);
+        });
     }
 }
 

@@ -28,7 +28,7 @@ const SHIFT: usize = 7;
 const INLIER_SIGMAS: f32 = 3.0;
 
 /// What decides whether a candidate is a region, beside the region's own fields.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Evidence {
     /// Mean confidence of the valid pixels; 0 when there is none.
     pub mean_confidence: f32,

@@ -7,9 +7,9 @@
 mod on_plane;
 mod without_plane;
 
-use super::{AttentionScene, Scene};
 use super::barrier::Barrier;
 use super::ego::EgoMotion;
+use super::{AttentionScene, Scene};
 use crate::image::Image;
 use crate::perception::View;
 use crate::simd::Level;

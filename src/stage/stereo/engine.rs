@@ -1,10 +1,10 @@
 //! Band after band through census, paths and winner, on any number of threads.
 
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
 
 use crate::image::Image;
 use crate::simd::{Block, LANES, Level, Simd, dispatch};
+use crate::stage::per_thread::PerThread;
 use crate::stage::stereo::block::{self, Measure};
 use crate::stage::stereo::census::Census;
 use crate::stage::stereo::cost::Penalties;
@@ -61,8 +61,7 @@ pub struct Views<'a> {
 pub struct Engine {
     level: Level,
     settings: Settings,
-    /// One set of buffers per thread.
-    scratch: Vec<Mutex<Scratch>>,
+    scratch: PerThread<Scratch>,
 }
 
 #[derive(Default)]
@@ -108,7 +107,7 @@ impl Rows<'_> {
 impl Engine {
     /// An engine without buffers: the first frame makes them.
     pub fn new(settings: Settings, level: Level) -> Self {
-        Self { level, settings, scratch: Vec::new() }
+        Self { level, settings, scratch: PerThread::new() }
     }
 
     /// Settings in force.
@@ -122,10 +121,7 @@ impl Engine {
         out.left.resize(size);
         out.right.resize(size);
         out.evidence.resize(size);
-        let threads = rayon::current_num_threads();
-        while self.scratch.len() < threads {
-            self.scratch.push(Mutex::default());
-        }
+        self.scratch.fit(Scratch::default);
         let rows = Rows {
             y0: 0,
             left: out.left.pixels_mut(),
@@ -154,10 +150,7 @@ impl Engine {
     /// Matches one band; all of `rows`, above and below it too, are written.
     fn band(&self, views: &Views<'_>, plan: &Plan, band: &Band, mut rows: Rows<'_>) {
         rows.clear();
-        let index = rayon::current_thread_index().unwrap_or(0) % self.scratch.len();
-        // A poisoned lock means that another frame's band panicked; the
-        // buffers are overwritten in any case.
-        let mut scratch = self.scratch[index].lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = self.scratch.lock();
         let (_, mut rows) = rows.split(band.y0);
         let settings = &self.settings;
         dispatch!(self.level, simd => scratch.band(simd, settings, views, plan, band, &mut rows));
