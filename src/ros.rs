@@ -15,6 +15,7 @@ pub mod play;
 pub mod qos;
 pub mod runtime;
 pub mod schema;
+pub mod security;
 pub mod services;
 pub mod time;
 pub mod yaml;

@@ -207,7 +207,7 @@ fn environment() -> Result<Environment, CommandError> {
         let value = std::env::var(name).ok().filter(|value| !value.is_empty());
         value.or_else(|| (name == "ROS_AUTOMATIC_DISCOVERY_RANGE").then(|| "LOCALHOST".to_owned()))
     };
-    Environment::from_variables(variable).map_err(|e| CommandError::Usage(e.to_string()))
+    Environment::from_variables(variable, None).map_err(|e| CommandError::Usage(e.to_string()))
 }
 
 /// The street bag: beside the working directory, the installed tool, or in the

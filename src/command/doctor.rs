@@ -71,7 +71,7 @@ pub fn run(args: &DoctorArgs) -> Result<Outcome, CommandError> {
         let options = bag_options(&config, args.topics.topics())?;
         examine_bag(bag, &config, options)
     } else {
-        let environment = Environment::of_process().map_err(|e| usage(&e))?;
+        let environment = Environment::of_process(ros.enclave.as_deref()).map_err(|e| usage(&e))?;
         let stop = stop_on_signal()?;
         say(format_args!(
             "listening on domain {}{} for {} s as the node would …",

@@ -24,10 +24,12 @@ Usage: salient_stereo_node [--ros-args ARGUMENTS… [--]]
   -r, --remap FROM:=TO          rename a topic, a service, __ns or __node
   -p, --param NAME:=VALUE       set a parameter
       --params-file FILE        set the parameters of a YAML file (config/*.yaml)
+  -e, --enclave ENCLAVE         where in the keystore the node's identity is (DDS security)
       --log-level [LOGGER:=]LEVEL
       --enable-rosout-logs, --disable-rosout-logs, --enable-stdout-logs, --disable-stdout-logs
 
-Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RMW_IMPLEMENTATION";
+Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RMW_IMPLEMENTATION,
+ROS_SECURITY_ENABLE, ROS_SECURITY_STRATEGY, ROS_SECURITY_KEYSTORE, ROS_SECURITY_ENCLAVE_OVERRIDE";
 
 /// The command line behind `node`.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -90,16 +92,13 @@ pub fn run(args: &NodeArgs) -> Result<ExitCode, NodeCommandError> {
     let names = ros.names("/", NODE_NAME)?;
     let (config, warnings) = ros.config(&Config::default(), &names)?;
     let qos_overrides = ros.qos_overrides(&names)?;
-    let environment = Environment::of_process()?;
+    let environment = Environment::of_process(ros.enclave.as_deref())?;
     log::init(&ros.log, &names.logger());
     for argument in rest {
         tracing::warn!("argument '{argument}' stands outside --ros-args and means nothing here");
     }
     for warning in warnings {
         tracing::warn!("{warning}");
-    }
-    if let Some(enclave) = &ros.enclave {
-        tracing::warn!("enclave '{enclave}' is not used: this node has no DDS security");
     }
 
     let signals = Arc::new(AtomicUsize::new(0));

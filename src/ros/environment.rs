@@ -6,16 +6,24 @@ use std::net::{IpAddr, Ipv4Addr};
 use ros2_client::ServiceMapping;
 use thiserror::Error;
 
-/// A variable with a value of no use.
+use crate::ros::security::{Demand, Enclave, SecurityError};
+
+/// What is wrong with the environment.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("environment variable {name}={value}: {wanted}")]
-pub struct EnvironmentError {
-    /// The variable.
-    pub name: &'static str,
-    /// Its value.
-    pub value: String,
-    /// What it may be.
-    pub wanted: &'static str,
+pub enum EnvironmentError {
+    /// A variable with a value of no use.
+    #[error("environment variable {name}={value}: {wanted}")]
+    Value {
+        /// The variable.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// What it may be.
+        wanted: &'static str,
+    },
+    /// Security is enforced and cannot be had.
+    #[error(transparent)]
+    Security(#[from] SecurityError),
 }
 
 /// Where to look for other nodes, and how to speak to them.
@@ -27,17 +35,20 @@ pub struct Environment {
     pub localhost: bool,
     /// How services travel.
     pub service_mapping: ServiceMapping,
+    /// Where identity and permissions come from; `None`: traffic is not secured.
+    pub security: Option<Enclave>,
     /// What was asked for and cannot be had, for the log.
     pub notes: Vec<String>,
 }
 
 impl Environment {
-    /// The environment of this process.
+    /// The environment of this process, which runs in `enclave` (`--enclave`).
     ///
     /// # Errors
-    /// For a value of no use, and when security is demanded.
-    pub fn of_process() -> Result<Self, EnvironmentError> {
-        Self::from_variables(|name| std::env::var(name).ok().filter(|value| !value.is_empty()))
+    /// For a value of no use, and when security is enforced and cannot be had.
+    pub fn of_process(enclave: Option<&str>) -> Result<Self, EnvironmentError> {
+        let variable = |name| std::env::var(name).ok().filter(|value: &String| !value.is_empty());
+        Self::from_variables(variable, enclave)
     }
 
     /// Loopback traffic on one domain, whatever the process environment says.
@@ -46,6 +57,7 @@ impl Environment {
             domain_id,
             localhost: true,
             service_mapping: ServiceMapping::Enhanced,
+            security: None,
             notes: Vec::new(),
         }
     }
@@ -56,17 +68,20 @@ impl Environment {
     /// As [`Environment::of_process`].
     pub fn from_variables(
         variable: impl Fn(&'static str) -> Option<String>,
+        enclave: Option<&str>,
     ) -> Result<Self, EnvironmentError> {
         let mut notes = Vec::new();
         let domain_id = match variable("ROS_DOMAIN_ID") {
             None => 0,
             Some(value) => {
                 // Above 232 the port numbers of the domain leave their range.
-                value.trim().parse().ok().filter(|id| *id <= 232).ok_or(EnvironmentError {
-                    name: "ROS_DOMAIN_ID",
-                    value,
-                    wanted: "a whole number from 0 to 232 is wanted",
-                })?
+                value.trim().parse().ok().filter(|id| *id <= 232).ok_or(
+                    EnvironmentError::Value {
+                        name: "ROS_DOMAIN_ID",
+                        value,
+                        wanted: "a whole number from 0 to 232 is wanted",
+                    },
+                )?
             }
         };
         let mut localhost = false;
@@ -82,7 +97,7 @@ impl Environment {
                     );
                 }
                 _ => {
-                    return Err(EnvironmentError {
+                    return Err(EnvironmentError::Value {
                         name: "ROS_AUTOMATIC_DISCOVERY_RANGE",
                         value,
                         wanted: "SUBNET, LOCALHOST, OFF or SYSTEM_DEFAULT is wanted",
@@ -96,7 +111,7 @@ impl Environment {
                 "1" => true,
                 "0" => false,
                 _ => {
-                    return Err(EnvironmentError {
+                    return Err(EnvironmentError::Value {
                         name: "ROS_LOCALHOST_ONLY",
                         value,
                         wanted: "0 or 1 is wanted",
@@ -109,16 +124,10 @@ impl Environment {
                 "ROS_STATIC_PEERS={peers} is not honoured: other hosts are found by multicast only"
             ));
         }
-        if variable("ROS_SECURITY_ENABLE").as_deref() == Some("true") {
-            if variable("ROS_SECURITY_STRATEGY").as_deref() == Some("Enforce") {
-                return Err(EnvironmentError {
-                    name: "ROS_SECURITY_STRATEGY",
-                    value: "Enforce".to_owned(),
-                    wanted: "this node has no DDS security; unset it or use Permissive",
-                });
-            }
-            notes.push("ROS_SECURITY_ENABLE=true is not honoured: traffic is not secured".into());
-        }
+        let security = match demand(&variable, enclave)? {
+            Some(demand) => demand.meet(&mut notes)?,
+            None => None,
+        };
         let service_mapping = match variable("RMW_IMPLEMENTATION").as_deref() {
             Some("rmw_cyclonedds_cpp") => ServiceMapping::Cyclone,
             Some(other) if other != "rmw_fastrtps_cpp" && other != "rmw_fastrtps_dynamic_cpp" => {
@@ -129,13 +138,44 @@ impl Environment {
             }
             _ => ServiceMapping::Enhanced,
         };
-        Ok(Self { domain_id, localhost, service_mapping, notes })
+        Ok(Self { domain_id, localhost, service_mapping, security, notes })
     }
 
     /// The only networks to use; `None` for all.
     pub(crate) fn only_networks(&self) -> Option<[IpAddr; 1]> {
         self.localhost.then_some([IpAddr::V4(Ipv4Addr::LOCALHOST)])
     }
+}
+
+/// What is asked for as to security; `None` when it is off.
+fn demand(
+    variable: &impl Fn(&'static str) -> Option<String>,
+    enclave: Option<&str>,
+) -> Result<Option<Demand>, EnvironmentError> {
+    // rcl takes other spellings for "off" and for "Permissive". Whoever wrote
+    // `1` or `enforce` meant the opposite, so they are refused here.
+    let refused = |name, value, wanted| Err(EnvironmentError::Value { name, value, wanted });
+    match variable("ROS_SECURITY_ENABLE") {
+        None => return Ok(None),
+        Some(value) => match value.as_str() {
+            "false" => return Ok(None),
+            "true" => {}
+            _ => return refused("ROS_SECURITY_ENABLE", value, "true or false is wanted"),
+        },
+    }
+    let enforce = match variable("ROS_SECURITY_STRATEGY") {
+        None => false,
+        Some(value) => match value.as_str() {
+            "Enforce" => true,
+            "Permissive" => false,
+            _ => return refused("ROS_SECURITY_STRATEGY", value, "Enforce or Permissive is wanted"),
+        },
+    };
+    Ok(Some(Demand {
+        enforce,
+        keystore: variable("ROS_SECURITY_KEYSTORE"),
+        enclave: variable("ROS_SECURITY_ENCLAVE_OVERRIDE").or(enclave.map(str::to_owned)),
+    }))
 }
 
 #[cfg(test)]
@@ -145,9 +185,10 @@ mod tests {
     fn environment(
         variables: &'static [(&'static str, &'static str)],
     ) -> Result<Environment, EnvironmentError> {
-        Environment::from_variables(|name| {
+        let look_up = |name: &str| {
             variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
-        })
+        };
+        Environment::from_variables(look_up, None)
     }
 
     #[test]
@@ -189,13 +230,30 @@ mod tests {
             &[("ROS_DOMAIN_ID", "x")],
             &[("ROS_AUTOMATIC_DISCOVERY_RANGE", "FAR")],
             &[("ROS_LOCALHOST_ONLY", "yes")],
-            &[("ROS_SECURITY_ENABLE", "true"), ("ROS_SECURITY_STRATEGY", "Enforce")],
+            &[("ROS_SECURITY_ENABLE", "1")],
+            &[("ROS_SECURITY_ENABLE", "true"), ("ROS_SECURITY_STRATEGY", "enforce")],
         ] {
-            let error = Environment::from_variables(|name| {
-                variables.iter().find(|(key, _)| *key == name).map(|(_, v)| (*v).to_owned())
-            })
-            .unwrap_err();
+            let error = environment(variables).unwrap_err();
             assert!(error.to_string().contains(variables.last().unwrap().0), "{error}");
         }
+    }
+
+    #[test]
+    fn enforced_security_is_had_or_nothing_starts() {
+        let error = environment(&[
+            ("ROS_SECURITY_ENABLE", "true"),
+            ("ROS_SECURITY_STRATEGY", "Enforce"),
+            ("ROS_SECURITY_KEYSTORE", "/no/such/keystore"),
+        ])
+        .unwrap_err();
+        let named =
+            if cfg!(feature = "security") { "/no/such/keystore" } else { "--features security" };
+        assert!(error.to_string().contains(named), "{error}");
+        let off = environment(&[
+            ("ROS_SECURITY_ENABLE", "false"),
+            ("ROS_SECURITY_STRATEGY", "Enforce"),
+            ("ROS_SECURITY_KEYSTORE", "/no/such/keystore"),
+        ]);
+        assert_eq!(off.unwrap().security, None);
     }
 }

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::net::UdpSocket;
+use std::path::PathBuf;
 
 use ros2_client::service::{Client, Server};
 use ros2_client::{
@@ -33,6 +34,19 @@ pub enum NodeError {
     Participant {
         /// The domain.
         domain_id: u16,
+        /// What the library said.
+        reason: String,
+    },
+    /// The participant was refused with this identity and these permissions.
+    #[error(
+        "cannot join DDS domain {domain_id} with the security files in {}: {reason}",
+        .enclave.display()
+    )]
+    Secured {
+        /// The domain.
+        domain_id: u16,
+        /// The enclave's folder.
+        enclave: PathBuf,
         /// What the library said.
         reason: String,
     },
@@ -76,11 +90,26 @@ impl RosNode {
     /// When sockets or threads are refused, or the names are.
     pub fn open(names: Names, environment: &Environment, rosout: bool) -> Result<Self, NodeError> {
         let domain_id = environment.domain_id;
-        let participant_error = |reason: String| NodeError::Participant { domain_id, reason };
+        let participant_error = |reason: String| match &environment.security {
+            None => NodeError::Participant { domain_id, reason },
+            Some(enclave) => {
+                NodeError::Secured { domain_id, enclave: enclave.folder().to_owned(), reason }
+            }
+        };
         let mut builder = DomainParticipantBuilder::new(domain_id)
             .socket_receive_buffer_size(RECEIVE_BUFFER_BYTES);
         if let Some(networks) = environment.only_networks() {
             builder = builder.with_only_networks(networks);
+        }
+        #[cfg(feature = "security")]
+        if let Some(enclave) = &environment.security {
+            use rustdds::DomainParticipantSecurityConfigFiles;
+            builder = builder.builtin_security(
+                DomainParticipantSecurityConfigFiles::with_ros_default_names(
+                    enclave.folder(),
+                    String::new(),
+                ),
+            );
         }
         let participant = builder.build().map_err(|e| participant_error(e.to_string()))?;
         let context = Context::from_domain_participant(participant)

@@ -164,10 +164,11 @@ impl NodeRuntime {
         };
         let services = Services::new(node, targets)?;
         tracing::info!(
-            "{} on domain {}{}: waiting for {}; regions on {regions_topic}, other topics only while subscribed to (lazy)",
+            "{} on domain {}{}{}: waiting for {}; regions on {regions_topic}, other topics only while subscribed to (lazy)",
             names.full_name(),
             environment.domain_id,
             if environment.localhost { ", this machine only" } else { "" },
+            if environment.security.is_some() { ", secured" } else { "" },
             topics.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>().join(", "),
         );
 

@@ -3,6 +3,8 @@
 
 mod faults;
 mod lazy;
+#[cfg(feature = "security")]
+mod security;
 
 use std::sync::atomic::AtomicBool;
 use std::thread;
