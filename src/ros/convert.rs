@@ -8,11 +8,12 @@
 //! | `Image`, `CompressedImage` of numbers | `Image<f32>`, `Image<u16>` | [`floats`], [`labels`], [`compressed_u16`] |
 //! | two `CameraInfo` | [`StereoRig`] | [`rig`] |
 //! | [`Camera`] | `CameraInfo` | [`camera_info`] |
-//! | [`Perception`] | messages | [`region_array`], [`detections_2d`], [`markers`], [`disparity_image`], [`depth_image`], [`points`], [`compressed_depth`], … |
+//! | [`Perception`] | messages | [`region_array`], [`detections_2d`], [`markers`], [`annotations`], [`disparity_image`], [`depth_image`], [`points`], [`compressed_depth`], … |
 //!
 //! [`StereoRig`]: crate::camera::StereoRig
 //! [`Camera`]: crate::camera::Camera
 
+mod annotation;
 mod bayer;
 mod calibration;
 mod compressed;
@@ -29,6 +30,7 @@ mod yuv;
 
 use thiserror::Error;
 
+pub use annotation::annotations;
 pub use calibration::{camera, camera_info, rig};
 pub use compressed::{compressed_picture, compressed_picture_into, compressed_u16};
 pub use dense::{

@@ -22,6 +22,7 @@ macro_rules! message {
 
 pub mod builtin_interfaces;
 pub mod diagnostic_msgs;
+pub mod foxglove_msgs;
 pub mod geometry_msgs;
 pub mod rcl_interfaces;
 pub mod rosgraph_msgs;

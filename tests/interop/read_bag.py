@@ -215,9 +215,30 @@ def check_markers(messages, places):
             check(marker.lifetime.nanosec > 0, f"{time}: a marker that stays for ever")
 
 
+def check_annotations(messages, regions):
+    check(len(messages) == len(regions), f"/regions/annotations: {len(messages)}")
+    for time, message in messages:
+        array = regions.get(time)
+        check(array is not None, f"/regions/annotations: no regions at {time}")
+        found = (len(message.points), len(message.texts))
+        if array is None or found != (len(array.regions), len(array.regions)):
+            check(False, f"{time}: {found} outlines and texts")
+            continue
+        for region, outline, text in zip(array.regions, message.points, message.texts):
+            stamps = {t.timestamp.sec * 1_000_000_000 + t.timestamp.nanosec for t in (outline, text)}
+            check(stamps == {time}, f"{time}: annotations of {stamps}")
+            drawn = [(p.x - 0.5, p.y - 0.5) for p in outline.points]
+            contour = [(p.x, p.y) for p in region.contour.points]
+            check(drawn == contour, f"{time}: outline of {len(drawn)} points, contour {len(contour)}")
+            check(text.text != "" and outline.thickness > 0, f"{time}: {text.text!r}")
+
+
+HEADERLESS = ["/markers", "/regions/annotations"]
+
+
 def check_results(topics):
-    marker_messages = topics.get("/markers", [])
-    topics = {topic: messages for topic, messages in topics.items() if topic != "/markers"}
+    marker_messages, annotations = (topics.get(topic, []) for topic in HEADERLESS)
+    topics = {topic: messages for topic, messages in topics.items() if topic not in HEADERLESS}
     by_topic = {
         topic: {stamp(m.header): m for _, m in messages}
         for topic, messages in topics.items()
@@ -263,6 +284,7 @@ def check_results(topics):
         counts["regions"] += len(array.regions)
     check(len(marker_messages) == len(places), f"/markers: {len(marker_messages)}")
     check_markers(marker_messages, places)
+    check_annotations(annotations, regions)
     return len(regions), counts
 
 

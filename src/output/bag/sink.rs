@@ -9,6 +9,7 @@ use crate::input::Observation;
 use crate::output::{Sink, picture};
 use crate::perception::Perception;
 use crate::ros::convert;
+use crate::ros::message::foxglove_msgs::ImageAnnotations;
 use crate::ros::message::salient_stereo_msgs::SalientRegionArray;
 use crate::ros::message::sensor_msgs::{self, CameraInfo, CompressedImage};
 use crate::ros::message::stereo_msgs::DisparityImage;
@@ -22,7 +23,7 @@ use crate::stamp::Stamp;
 pub struct BagTopicsOut {
     /// `/regions`
     pub regions: bool,
-    /// `/detections_2d`, `/detections_3d` and `/markers`
+    /// `/detections_2d`, `/detections_3d`, `/markers` and `/regions/annotations`
     pub detections: bool,
     /// `/disparity`
     pub disparity: bool,
@@ -86,6 +87,8 @@ struct Detections {
     flat: Topic<Detection2DArray>,
     solid: Topic<Detection3DArray>,
     markers: Topic<MarkerArray>,
+    /// For the Image panel of Foxglove; the node does not publish it.
+    annotations: Topic<ImageAnnotations>,
 }
 
 impl Detections {
@@ -94,6 +97,7 @@ impl Detections {
             flat: bag.topic("/detections_2d")?,
             solid: bag.topic("/detections_3d")?,
             markers: bag.topic("/markers")?,
+            annotations: bag.topic("/regions/annotations")?,
         })
     }
 
@@ -101,7 +105,8 @@ impl Detections {
         let stamp = perception.stamp;
         bag.write(self.flat, stamp, &convert::detections_2d(perception))?;
         bag.write(self.solid, stamp, &convert::detections_3d(perception))?;
-        bag.write(self.markers, stamp, &convert::markers(perception))
+        bag.write(self.markers, stamp, &convert::markers(perception))?;
+        bag.write(self.annotations, stamp, &convert::annotations(perception))
     }
 }
 

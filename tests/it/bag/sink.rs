@@ -73,6 +73,7 @@ fn a_replay_gives_the_same_bytes_for_any_number_of_threads() {
         "/markers",
         "/overlay/image/compressed",
         "/regions",
+        "/regions/annotations",
         "/regions/label_image",
         "/saliency/image_rect",
     ];
