@@ -29,6 +29,7 @@ mod it {
     mod params;
     #[cfg(feature = "tool")]
     mod picture;
+    mod pipeline;
     mod preprocess;
     mod reference;
     mod regions;
