@@ -9,6 +9,8 @@ mod it {
     mod depth;
     #[cfg(feature = "tool")]
     mod doctor;
+    #[cfg(feature = "tool")]
+    mod domain;
     mod ego;
     #[cfg(feature = "tool")]
     mod evaluate;

@@ -36,9 +36,8 @@ fn python() -> Command {
     Command::new(std::env::var_os("SALIENT_STEREO_PYTHON").unwrap_or_else(|| "python3".into()))
 }
 
-/// A domain that no other test of this process uses: 4 is this file's.
 fn domain() -> u16 {
-    1 + (std::process::id() % 12) as u16 * 8 + 4
+    super::domain::domain(4)
 }
 
 fn start(domain: u16) -> NodeRuntime {

@@ -2,7 +2,10 @@
 //! own, one the node, one its peer. Bounded in count and time.
 
 mod faults;
+mod inputs;
 mod lazy;
+#[cfg(unix)]
+mod process;
 #[cfg(feature = "security")]
 mod security;
 
@@ -31,13 +34,14 @@ use salient_stereo::ros::runtime::{NodeOptions, NodeRuntime};
 use salient_stereo::stamp::Stamp;
 use serde_json::json;
 
+use super::domain::domain;
+
 const WIDTH: usize = 320;
 const HEIGHT: usize = 120;
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A domain that no other test of this process uses, and hardly one of another.
 fn environment(test: u16) -> Environment {
-    Environment::localhost(1 + (std::process::id() % 12) as u16 * 8 + test)
+    Environment::localhost(domain(test))
 }
 
 fn names(node: &str) -> Names {

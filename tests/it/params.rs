@@ -1,6 +1,6 @@
 //! The shipped parameter files agree with the code.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use salient_stereo::config::Config;
 use salient_stereo::ros::params::{self, apply, read_file};
@@ -63,4 +63,35 @@ fn a_dump_of_a_running_node_loads_back() {
     let (loaded, warnings) = apply(&Config::default(), &all, "/robot/eye").unwrap();
     assert_eq!(loaded, config);
     assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+#[test]
+fn the_page_of_promises_names_tests_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = std::fs::read_to_string(root.join("docs/interface.md")).unwrap();
+    let (promises, _) = page.split_once("## Not kept").unwrap();
+    let mut sources = String::new();
+    let mut folders = vec![root.join("src"), root.join("tests")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                sources.push_str(&std::fs::read_to_string(path).unwrap());
+            }
+        }
+    }
+    let rows = promises.lines().filter(|line| line.starts_with("| ") && line.contains('`'));
+    let mut named = 0;
+    for row in rows {
+        let tests = row.trim_end_matches(['|', ' ']).rsplit("| ").next().unwrap();
+        let names: Vec<_> = tests.split('`').skip(1).step_by(2).collect();
+        assert!(!names.is_empty(), "no test: {row}");
+        for name in names {
+            assert!(sources.contains(&format!("fn {name}(")), "{name} is no test");
+            named += 1;
+        }
+    }
+    assert!(named > 80, "{named}");
 }

@@ -6,6 +6,7 @@ use std::process::Command;
 use salient_stereo::image::Size;
 
 use super::recipe::Recipe;
+use crate::it::domain::domain;
 
 /// A pinhole calibration as `camera_calibration` writes it.
 fn calibration(tx: f64) -> String {
@@ -29,7 +30,7 @@ fn calibration_files_stand_in_for_the_camera_infos_that_a_bag_lacks() {
     Recipe { size: Size::new(200, 64), infos: false, ..Recipe::default() }.write(&path("in.mcap"));
     fs::write(path("left.yaml"), calibration(0.0)).unwrap();
     fs::write(path("right.yaml"), calibration(-200.0)).unwrap();
-    let domain = 1 + (std::process::id() % 12) * 8 + 7;
+    let domain = domain(8);
     let run = Command::new(env!("CARGO_BIN_EXE_salient_stereo"))
         .arg("demo")
         .arg(path("in.mcap"))

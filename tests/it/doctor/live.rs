@@ -17,9 +17,10 @@ use salient_stereo::ros::play::{ImagePair, StereoMessages, StereoPlayer};
 use salient_stereo::ros::qos;
 
 use super::{Sent, expect, sent};
+use crate::it::domain::domain;
 
 fn environment(test: u16) -> Environment {
-    Environment::localhost(1 + (std::process::id() % 12) as u16 * 8 + test)
+    Environment::localhost(domain(test))
 }
 
 fn names(node: &str) -> Names {
