@@ -127,7 +127,7 @@ impl Scene {
         let cells = Image::from_fn(SIZE.divided_by(4), |x, y| {
             self.saliency.get((4 * x + 1).min(SIZE.width - 1), (4 * y + 1).min(SIZE.height - 1))
         });
-        let mut stage = Roi::new(&self.config, SIZE);
+        let mut stage = Roi::new(&self.config, SIZE, simd::detect());
         let Self { perception, coarse, saliency, roi, .. } = self;
         move || stage.run(&cells, saliency, coarse, &perception.rig, roi)
     }

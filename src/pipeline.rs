@@ -53,7 +53,7 @@ impl Pipeline {
             preprocess,
             coarse: Coarse::new(config, size, level),
             saliency: Saliency::new(config, size, level),
-            roi: Roi::new(config, size),
+            roi: Roi::new(config, size, level),
             stereo: Stereo::new(config, size, level),
             refine: Refine::new(config, size),
             depth: Depth::new(config),

@@ -10,6 +10,7 @@ use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
 use crate::perception::RoiMask;
+use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
 
 use bits::BitMask;
@@ -27,6 +28,7 @@ const SLACK: f32 = 1.0;
 
 /// Threshold, morphology, components, area budget, dilation.
 pub struct Roi {
+    level: Level,
     size: Size,
     full_frame: bool,
     rectangle: Option<f32>,
@@ -44,8 +46,9 @@ pub struct Roi {
 
 impl Roi {
     /// The stage for views of `size`.
-    pub fn new(config: &Config, size: Size) -> Self {
+    pub fn new(config: &Config, size: Size, level: Level) -> Self {
         Self {
+            level,
             size,
             full_frame: config.saliency.mode == SaliencyMode::FullFrame,
             rectangle: None,
@@ -99,7 +102,7 @@ impl Roi {
             self.matched.copy_from(&self.salient);
         } else {
             let threshold = self.threshold.unwrap_or_else(|| otsu(attention));
-            self.salient.set_from(saliency, threshold);
+            self.salient.set_from(self.level, saliency, threshold);
             self.gate_depth(coarse, rig);
             self.salient.open(OPENING);
             self.salient.close(CLOSING);

@@ -4,6 +4,7 @@ use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::{Config, SaliencyMode, ThresholdMode};
 use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::RoiMask;
+use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::roi::Roi;
 use salient_stereo::stage::roi::bits::BitMask;
@@ -25,7 +26,7 @@ fn blobs(size: Size, seed: u64) -> Mask {
 fn bits(mask: &Mask) -> BitMask {
     let map = Image::from_fn(mask.size(), |x, y| f32::from(u8::from(mask.get(x, y))));
     let mut bits = BitMask::default();
-    bits.set_from(&map, 0.5);
+    bits.set_from(simd::detect(), &map, 0.5);
     bits
 }
 
@@ -54,10 +55,12 @@ fn a_mask_of_bits_holds_what_was_put_in() {
     for size in ODD_SIZES {
         let map = Noise(1).map(size);
         let mut bits = BitMask::default();
-        bits.set_from(&map, 0.3);
-        assert_eq!(flags(&bits), Image::from_fn(size, |x, y| map.get(x, y) >= 0.3), "{size}");
+        for level in simd::available() {
+            bits.set_from(level, &map, 0.3);
+            assert_eq!(flags(&bits), Image::from_fn(size, |x, y| map.get(x, y) >= 0.3), "{size}");
+        }
         let nothing = Image::filled(size, f32::NAN);
-        bits.set_from(&nothing, 0.0);
+        bits.set_from(simd::detect(), &nothing, 0.0);
         assert_eq!(bits.count(), 0, "NaN is not salient");
     }
 }
@@ -158,7 +161,7 @@ fn run(config: &Config, coarse: &CoarseDisparity, rig: &StereoRig) -> RoiMask {
     let (attention, mut saliency) = (attention(), Image::default());
     upsample(&attention, SIZE, &mut saliency);
     let mut out = RoiMask::default();
-    Roi::new(config, SIZE).run(&attention, &saliency, coarse, rig, &mut out);
+    Roi::new(config, SIZE, simd::detect()).run(&attention, &saliency, coarse, rig, &mut out);
     assert_eq!((out.salient.size(), out.matched.size()), (SIZE, SIZE));
     assert!((out.fraction - share(&of(&out.matched))).abs() < 1e-6);
     out
@@ -265,7 +268,7 @@ fn full_frame_is_everything() {
 fn a_centred_rectangle_has_its_share_and_the_aspect_of_the_image() {
     let (attention, saliency) = (attention(), Image::filled(SIZE, 1.0));
     for fraction in [0.0, 0.25, 0.5, 1.0] {
-        let mut roi = Roi::new(&Config::default(), SIZE);
+        let mut roi = Roi::new(&Config::default(), SIZE, simd::detect());
         roi.set_centred_rectangle(fraction);
         let mut out = RoiMask::default();
         roi.run(&attention, &saliency, &unknown(), &rig(60.0), &mut out);
@@ -289,6 +292,6 @@ fn a_single_pixel_is_a_frame_too() {
     let mut config = Config::default();
     config.regions.min_area = 1;
     let mut out = RoiMask::default();
-    Roi::new(&config, size).run(&cell, &pixel, &coarse, &rig(60.0), &mut out);
+    Roi::new(&config, size, simd::detect()).run(&cell, &pixel, &coarse, &rig(60.0), &mut out);
     assert_eq!((out.salient.pixels(), out.fraction), (&[255][..], 1.0));
 }

@@ -1,8 +1,14 @@
 //! A mask of one bit per pixel: 64 pixels are dilated by one instruction.
 
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 /// Pixels per word; pixel `x` of a row is bit `x % 64` of its word `x / 64`.
 const WORD: usize = u64::BITS as usize;
@@ -70,22 +76,14 @@ impl BitMask {
     }
 
     /// The pixels of `map` that are at least `threshold` (NaN is not).
-    pub fn set_from(&mut self, map: &Image<f32>, threshold: f32) {
+    pub fn set_from(&mut self, level: Level, map: &Image<f32>, threshold: f32) {
         self.reset(map.size());
         if self.size.is_empty() {
             return;
         }
         let rows = map.pixels().par_chunks_exact(self.size.width);
         self.words.par_chunks_exact_mut(self.stride).zip(rows).with_min_len(32).for_each(
-            |(words, row)| {
-                for (word, values) in words.iter_mut().zip(row.chunks(WORD)) {
-                    let mut bytes = [0_u8; WORD];
-                    for (byte, &value) in bytes.iter_mut().zip(values) {
-                        *byte = u8::from(value >= threshold);
-                    }
-                    *word = pack(&bytes);
-                }
-            },
+            |(words, row)| dispatch!(level, simd => compare_row(simd, row, threshold, words)),
         );
     }
 
@@ -203,15 +201,21 @@ fn towards_lower(row: &mut [u64], step: usize) {
     row[last] |= row[last] >> step;
 }
 
-/// 64 bytes of 0 or 1 as the bits of a word.
-fn pack(bytes: &[u8; WORD]) -> u64 {
-    let (eights, _) = bytes.as_chunks::<8>();
-    eights.iter().rev().fold(0, |word, eight| {
-        // The product moves the bit of byte i to bit 56 + i, and no two of its
-        // partial products meet.
-        let bits = u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
-        word << 8 | bits
-    })
+/// Bit `x` of `words` says whether value `x` is at least `threshold`.
+#[inline(always)]
+fn compare_row<S: Simd>(simd: S, values: &[f32], threshold: f32, words: &mut [u64]) {
+    const LANES: usize = 16;
+    for (word, values) in words.iter_mut().zip(values.chunks(WORD)) {
+        *word = 0;
+        let (whole, cut) = values.as_chunks::<LANES>();
+        for (i, lanes) in whole.iter().enumerate() {
+            let bits = f32x16::from_slice(simd, lanes).simd_ge(threshold).to_bitmask();
+            *word |= bits << (i * LANES);
+        }
+        for (i, value) in cut.iter().enumerate() {
+            *word |= u64::from(*value >= threshold) << (whole.len() * LANES + i);
+        }
+    }
 }
 
 /// For each byte eight pixels: 255 where its bit is set.
