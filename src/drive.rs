@@ -15,7 +15,7 @@ use crate::output::AnySink;
 use crate::perception::{Clock, Perception, StereoFrame};
 use crate::pipeline::Pipeline;
 use crate::simd::{self, Level};
-use crate::stage::ground::Ground;
+use crate::stage::ground::Footing;
 use crate::stamp::Stamp;
 
 /// What ends a drive early.
@@ -153,9 +153,9 @@ impl Engine {
         Some([&perception.left.gray, &pipeline.right().gray])
     }
 
-    /// The ground plane of the last frame; `None` in modes that look for none.
-    pub fn ground(&self) -> Option<&Ground> {
-        self.running.as_ref()?.pipeline.ground()
+    /// The plane that things stand on in the last frame; `None` in modes that look for none.
+    pub fn footing(&self) -> Option<Footing> {
+        self.running.as_ref()?.pipeline.footing()
     }
 
     /// Takes the result of the last frame out, so that it can be published

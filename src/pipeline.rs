@@ -6,7 +6,7 @@ use crate::perception::{Clock, Perception, Stage, StageTimes, StereoFrame, View}
 use crate::simd::Level;
 use crate::stage::coarse::{Coarse, CoarseDisparity};
 use crate::stage::depth::Depth;
-use crate::stage::ground::Ground;
+use crate::stage::ground::Footing;
 use crate::stage::preprocess::Preprocess;
 use crate::stage::refine::Refine;
 use crate::stage::regions::{RegionSource, Regions};
@@ -111,9 +111,9 @@ impl Pipeline {
         &self.right
     }
 
-    /// The ground plane of the last frame; `None` in modes that look for none.
-    pub fn ground(&self) -> Option<&Ground> {
-        self.saliency.ground()
+    /// The plane that things stand on in the last frame; `None` in modes that look for none.
+    pub fn footing(&self) -> Option<Footing> {
+        self.saliency.footing()
     }
 
     /// Forgets the previous frame and all tracks, as after a jump in time.
@@ -142,7 +142,8 @@ impl Pipeline {
             rig: &out.rig,
         };
         self.saliency.run(&scene, &mut self.previous, &mut self.attention, &mut out.saliency);
-        out.ground = self.saliency.ground().map(Ground::state).unwrap_or_default();
+        let footing = self.saliency.footing().unwrap_or_default();
+        out.ground = footing.state;
         lap.mark(&mut out.times, Stage::Saliency);
 
         self.roi.set_allowance(self.latency.allowance(lap.total_ms));
@@ -180,7 +181,8 @@ impl Pipeline {
             confidence: &out.confidence,
             depth: &out.depth,
             rig: &out.rig,
-            plane: self.saliency.ground().and_then(Ground::plane),
+            plane: footing.ground(),
+            table: footing.table(),
         };
         self.regions.run(&source, &mut out.labels, &mut out.regions, &mut out.rejections);
         lap.mark(&mut out.times, Stage::Regions);

@@ -11,4 +11,5 @@ pub mod roi;
 pub mod saliency;
 pub mod standing;
 pub mod stereo;
+pub mod table;
 pub mod track;

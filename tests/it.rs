@@ -46,6 +46,7 @@ mod it {
     mod sync;
     #[cfg(feature = "tool")]
     mod synthetic;
+    mod table;
     mod track;
     #[cfg(feature = "tool")]
     mod vectors;

@@ -14,7 +14,7 @@ pub use report::{Reporter, Surroundings};
 
 use crate::metric::Epipolar;
 use crate::perception::{Rejections, StageTimes};
-use crate::stage::ground::{GroundState, Plane};
+use crate::stage::ground::Footing;
 use crate::sync::{Counts, Settings};
 
 /// Most drop reasons that are told apart: their texts hold numbers of untrusted
@@ -59,7 +59,7 @@ pub struct NodeStatus {
     dropped: Mutex<BTreeMap<String, u64>>,
     calibration: Mutex<Option<Result<String, String>>>,
     alignment: Mutex<VecDeque<Epipolar>>,
-    ground: Mutex<Option<GroundSeen>>,
+    ground: Mutex<Option<Footing>>,
     latency: Mutex<Latency>,
     work: Mutex<Work>,
     published: Mutex<BTreeMap<String, u64>>,
@@ -79,9 +79,6 @@ pub struct Work {
     /// Candidates refused, summed.
     pub rejections: [u64; Rejections::KINDS],
 }
-
-/// Whether the ground was seen in the last frame, and as which plane.
-pub type GroundSeen = (GroundState, Option<Plane>);
 
 /// How long results took since the last report, from the complete pair to the
 /// published regions.
@@ -234,7 +231,7 @@ impl NodeStatus {
     }
 
     /// The ground in the last frame; `None` when nobody looks for it.
-    pub fn note_ground(&self, seen: Option<GroundSeen>) {
+    pub fn note_ground(&self, seen: Option<Footing>) {
         *lock(&self.ground) = seen;
     }
 

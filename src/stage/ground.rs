@@ -69,6 +69,44 @@ pub struct Plane {
 }
 
 impl Plane {
+    /// The plane with these coefficients; `None` when it is no plane in space, or
+    /// nearer or farther than anything stands on.
+    pub fn new(a: f32, b: f32, c: f32, rig: &StereoRig) -> Option<Self> {
+        let n = normal(a, b, c, rig);
+        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        let camera_height_m = rig.depth_scale() as f32 / length;
+        HEIGHTS_M.contains(&camera_height_m).then_some(Self {
+            a,
+            b,
+            c,
+            camera_height_m,
+            distance_m: 10.0,
+        })
+    }
+
+    /// Cosine between the plane's normal and the image's vertical: 1 for a floor
+    /// under a level camera.
+    pub fn upright(&self, rig: &StereoRig) -> f32 {
+        normal(self.a, self.b, self.c, rig)[1] * self.camera_height_m / rig.depth_scale() as f32
+    }
+
+    /// Cosine between the plane's normal and the optical axis: 1 for what is seen
+    /// straight from above.
+    pub fn facing(&self, rig: &StereoRig) -> f32 {
+        normal(self.a, self.b, self.c, rig)[2] * self.camera_height_m / rig.depth_scale() as f32
+    }
+
+    /// A plane between this one and `new`.
+    #[must_use]
+    pub fn mixed(&self, new: &Self, share: f32, rig: &StereoRig) -> Self {
+        let blend = |o: f32, n: f32| o + share * (n - o);
+        let mixed =
+            Self::new(blend(self.a, new.a), blend(self.b, new.b), blend(self.c, new.c), rig);
+        let distance_m = blend(self.distance_m, new.distance_m);
+        // Two planes before the camera have one between them, but rounding may say otherwise.
+        mixed.map_or(*new, |plane| Self { distance_m, ..plane })
+    }
+
     /// Disparity of the plane at pixel (u, v).
     #[inline]
     pub fn disparity(&self, u: f32, v: f32) -> f32 {
@@ -100,6 +138,10 @@ pub enum GroundState {
     Measured = 1,
     /// The last plane is used; this frame did not support one.
     Held = 2,
+    /// A plane that is looked down upon was measured in this frame.
+    Table = 3,
+    /// The last such plane is used.
+    TableHeld = 4,
 }
 
 impl GroundState {
@@ -109,7 +151,32 @@ impl GroundState {
             Self::None => "no plane",
             Self::Measured => "plane",
             Self::Held => "plane held",
+            Self::Table => "plane from above",
+            Self::TableHeld => "plane from above held",
         }
+    }
+}
+
+/// What the attention of a frame reckons with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Footing {
+    /// Whether there is a plane, and which.
+    pub state: GroundState,
+    /// It.
+    pub plane: Option<Plane>,
+}
+
+impl Footing {
+    /// The ground, if that is it.
+    pub fn ground(&self) -> Option<&Plane> {
+        let ground = matches!(self.state, GroundState::Measured | GroundState::Held);
+        self.plane.as_ref().filter(|_| ground)
+    }
+
+    /// The plane that is looked down upon, if that is it.
+    pub fn table(&self) -> Option<&Plane> {
+        let table = matches!(self.state, GroundState::Table | GroundState::TableHeld);
+        self.plane.as_ref().filter(|_| table)
     }
 }
 
@@ -176,7 +243,7 @@ impl Ground {
                 // out, but a plane that is elsewhere is taken as it is.
                 let step = (new.camera_height_m / old.camera_height_m - 1.0).abs();
                 let share = if step < MAX_STEP { RENEWAL } else { 1.0 };
-                *old = mix(old, &new, share, rig);
+                *old = old.mixed(&new, share, rig);
                 (self.state, self.failures) = (GroundState::Measured, 0);
             }
             (Some(new), none) => {
@@ -311,16 +378,17 @@ impl Ground {
     }
 }
 
+/// |n| is f B over the distance of the camera.
+fn normal(a: f32, b: f32, c: f32, rig: &StereoRig) -> [f32; 3] {
+    let (cx, cy) = rig.principal_point();
+    [b * rig.focal_px() as f32, a * rig.focal_y_px() as f32, a * cy as f32 + b * cx as f32 + c]
+}
+
 /// The plane with these coefficients if it may be a ground.
 fn plane_of(a: f32, b: f32, c: f32, rig: &StereoRig) -> Option<Plane> {
-    let (cx, cy) = rig.principal_point();
-    let n =
-        [b * rig.focal_px() as f32, a * rig.focal_y_px() as f32, a * cy as f32 + b * cx as f32 + c];
-    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-    let height = rig.depth_scale() as f32 / length;
-    let plausible =
-        n[1] > MIN_UPRIGHT * length && n[0].abs() < MAX_ROLL * n[1] && HEIGHTS_M.contains(&height);
-    plausible.then_some(Plane { a, b, c, camera_height_m: height, distance_m: 10.0 })
+    let n = normal(a, b, c, rig);
+    let plane = Plane::new(a, b, c, rig)?;
+    (plane.upright(rig) > MIN_UPRIGHT && n[0].abs() < MAX_ROLL * n[1]).then_some(plane)
 }
 
 /// The plane without roll through two votes.
@@ -343,14 +411,6 @@ fn through(p: Vote, q: Vote, r: Vote, rig: &StereoRig) -> Option<Plane> {
     let a = (dd1 * du2 - dd2 * du1) / area;
     let b = (dv1 * dd2 - dv2 * dd1) / area;
     plane_of(a, b, p.d - a * p.v - b * p.u, rig)
-}
-
-fn mix(old: &Plane, new: &Plane, share: f32, rig: &StereoRig) -> Plane {
-    let blend = |o: f32, n: f32| o + share * (n - o);
-    let mixed = plane_of(blend(old.a, new.a), blend(old.b, new.b), blend(old.c, new.c), rig);
-    let distance_m = blend(old.distance_m, new.distance_m);
-    // Two grounds have no wall between them, but rounding may say otherwise.
-    mixed.map_or(*new, |plane| Plane { distance_m, ..plane })
 }
 
 /// Centre of a cell in full-size pixels.

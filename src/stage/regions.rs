@@ -3,6 +3,7 @@
 pub mod components;
 pub mod contour;
 pub mod measure;
+pub mod raised;
 pub mod simplify;
 pub mod union_find;
 pub mod upright;
@@ -20,6 +21,7 @@ use crate::stage::per_thread::PerThread;
 use components::{Candidates, Components};
 use contour::Contour;
 use measure::{Evidence, Measure};
+use raised::Raised;
 use upright::Upright;
 
 /// Least share of a region's pixels that must have a disparity.
@@ -60,6 +62,8 @@ pub struct RegionSource<'a> {
     /// The ground, where one is known: what stands on it becomes a region.
     /// Without it, connected pixels of one depth do.
     pub plane: Option<&'a Plane>,
+    /// A plane that is looked down upon: what stands off it becomes a region.
+    pub table: Option<&'a Plane>,
 }
 
 /// The region former.
@@ -71,6 +75,7 @@ pub struct Regions {
     contour_tolerance: f32,
     components: Components,
     upright: Upright,
+    raised: Raised,
     candidates: Candidates,
     /// Ids of the candidates that are large enough, and what speaks for each.
     ids: Vec<u32>,
@@ -96,6 +101,7 @@ impl Regions {
             contour_tolerance: config.regions.contour_tolerance as f32,
             components: Components::default(),
             upright: Upright::new(level),
+            raised: Raised::new(level),
             candidates: Candidates::default(),
             ids: Vec::new(),
             evidence: Vec::new(),
@@ -116,6 +122,8 @@ impl Regions {
         if let Some(plane) = source.plane {
             let area = self.min_area;
             self.upright.run(plane, source, area, &mut self.candidates, rejections);
+        } else if let Some(plane) = source.table {
+            self.raised.run(plane, source, &mut self.components, &mut self.candidates);
         } else {
             self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
         }

@@ -40,7 +40,7 @@ use crate::image::{Image, Size};
 use crate::perception::View;
 use crate::simd::{Level, dispatch};
 use crate::stage::coarse::{CELL, CoarseDisparity};
-use crate::stage::ground::Ground;
+use crate::stage::ground::Footing;
 use crate::stamp::Stamp;
 
 use flow::Flow;
@@ -169,10 +169,10 @@ impl Saliency {
         }
     }
 
-    /// The ground plane of the last frame, for the mode that looks for one.
-    pub fn ground(&self) -> Option<&Ground> {
+    /// The plane of the last frame, for the mode that looks for one.
+    pub fn footing(&self) -> Option<Footing> {
         match &self.mode {
-            Mode::Scene(mode) => Some(mode.ground()),
+            Mode::Scene(mode) => Some(mode.footing()),
             _ => None,
         }
     }

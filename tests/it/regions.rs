@@ -319,6 +319,7 @@ impl Boxes {
             depth: &depth,
             rig: &rig,
             plane: None,
+            table: None,
         };
         let mut outs = simd::available().into_iter().map(|level| {
             let mut out = (Image::default(), RegionList::default(), Rejections::default());

@@ -240,7 +240,7 @@ impl Reporter {
 mod tests {
     use super::*;
     use crate::metric::Epipolar;
-    use crate::stage::ground::{GroundState, Plane};
+    use crate::stage::ground::{Footing, GroundState, Plane};
 
     fn status<'a>(message: &'a DiagnosticArray, name: &str) -> &'a DiagnosticStatus {
         message.status.iter().find(|s| s.name.ends_with(name)).unwrap()
@@ -343,11 +343,11 @@ mod tests {
         assert_eq!(first("longest latency beyond the stages (ms)").unwrap(), "2.00");
         assert_eq!(first("ground").unwrap(), "not looked for");
         let plane = Plane { a: 0.1, b: 0.0, c: 0.0, camera_height_m: 1.65, distance_m: 12.0 };
-        node_status.note_ground(Some((GroundState::Measured, Some(plane))));
+        node_status.note_ground(Some(Footing { state: GroundState::Measured, plane: Some(plane) }));
         let second = values();
         assert_eq!(second("latency from pair to regions (ms)"), None);
         assert_eq!(second("ground").unwrap(), "plane, camera 1.65 m above it");
-        node_status.note_ground(Some((GroundState::None, None)));
+        node_status.note_ground(Some(Footing::default()));
         assert_eq!(values()("ground").unwrap(), "no plane");
     }
 

@@ -1,10 +1,11 @@
 //! What the statuses of the `/diagnostics` message say of alignment, ground and stages.
 
+use super::Work;
 use super::draft::Draft;
-use super::{GroundSeen, Work};
 use crate::metric::{Epipolar, MISALIGNED_PX};
 use crate::perception::{Rejections, Stage};
 use crate::ros::message::diagnostic_msgs::DiagnosticStatus;
+use crate::stage::ground::Footing;
 
 /// How the rows of the two images lie to each other.
 pub(super) fn alignment(found: &Epipolar, rectify: bool, draft: &mut Draft) {
@@ -24,11 +25,11 @@ pub(super) fn alignment(found: &Epipolar, rectify: bool, draft: &mut Draft) {
 }
 
 /// The ground plane, in words.
-pub(super) fn ground(seen: Option<&GroundSeen>) -> String {
+pub(super) fn ground(seen: Option<&Footing>) -> String {
     match seen {
         None => "not looked for".to_owned(),
-        Some((state, None)) => state.name().to_owned(),
-        Some((state, Some(plane))) => {
+        Some(Footing { state, plane: None }) => state.name().to_owned(),
+        Some(Footing { state, plane: Some(plane) }) => {
             format!("{}, camera {:.2} m above it", state.name(), plane.camera_height_m)
         }
     }

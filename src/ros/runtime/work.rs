@@ -93,9 +93,7 @@ impl Worker {
                 continue;
             }
             self.grays.take(&engine, &config);
-            self.status.note_ground(
-                engine.ground().map(|ground| (ground.state(), ground.plane().copied())),
-            );
+            self.status.note_ground(engine.footing());
             let spare = self.spares.lock().unwrap_or_else(PoisonError::into_inner).pop();
             let Some(perception) = engine.exchange(spare) else { continue };
             let observation = Observation { frame, truth: None };

@@ -1,10 +1,11 @@
 //! Mode `scene`: what stands on the ground, stands out, is near, or moves.
 //!
 //! On roads no cue of appearance finds what matters, height above the ground
-//! does; in pictures of things the minimum barrier distance does. The ground
-//! plane decides which of the two is asked.
+//! does; in pictures of things the minimum barrier distance does, and where a
+//! table is seen from above the relief. The plane decides which is asked.
 
 mod on_plane;
+mod on_table;
 mod without_plane;
 
 use super::barrier::Barrier;
@@ -13,21 +14,30 @@ use super::{AttentionScene, Scene};
 use crate::image::Image;
 use crate::perception::View;
 use crate::simd::Level;
-use crate::stage::ground::Ground;
+use crate::stage::ground::{Footing, Ground};
+use crate::stage::table::Table;
 
 use on_plane::OnPlane;
+use on_table::OnTable;
 use without_plane::{Cues, WithoutPlane};
 
 /// Share of measured cells from which a frame counts as one with depth.
 const LEAST_MEASURED: f32 = 0.15;
 
+/// Cosine between a ground's normal and the image's vertical below which it may
+/// be seen as a table as well, and the same when it was one in the frame before.
+const STEEP: f32 = 0.4;
+const STEEP_STILL: f32 = 0.5;
+
 /// The mode with its cues.
 #[derive(Debug)]
 pub struct SceneSaliency {
     ground: Ground,
+    table: Table,
     barrier: Barrier,
     ego: EgoMotion,
     on_plane: OnPlane,
+    on_table: OnTable,
     without_plane: WithoutPlane,
     fourth: Image<u8>,
     color: Image<f32>,
@@ -39,9 +49,11 @@ impl SceneSaliency {
     pub fn new(level: Level) -> Self {
         Self {
             ground: Ground::default(),
+            table: Table::default(),
             barrier: Barrier::new(level),
             ego: EgoMotion::new(level),
             on_plane: OnPlane::new(level),
+            on_table: OnTable::default(),
             without_plane: WithoutPlane::default(),
             fourth: Image::default(),
             color: Image::default(),
@@ -49,18 +61,34 @@ impl SceneSaliency {
         }
     }
 
-    /// The ground as estimated in the last frame.
-    pub fn ground(&self) -> &Ground {
-        &self.ground
+    /// The plane that attention reckoned with in the last frame: a table before
+    /// the ground, which is only asked for where there is none or a steep one.
+    pub fn footing(&self) -> Footing {
+        match self.table.plane() {
+            Some(&plane) => Footing { state: self.table.state(), plane: Some(plane) },
+            None => Footing { state: self.ground.state(), plane: self.ground.plane().copied() },
+        }
     }
 
-    /// What needs no flow, so that it can run beside it: the ground, which is
-    /// searched anew when the frame is the `first` one, and the barriers.
-    pub fn prepare(&mut self, scene: &Scene<'_>, cells: &View, first: bool) {
+    /// Looks for the ground, and for a table where there is none or a steep one.
+    fn find_footing(&mut self, scene: &Scene<'_>, first: bool) {
         if first {
             self.ground.reset();
+            self.table.reset();
         }
         self.ground.run(&scene.coarse.checked, scene.rig);
+        let steep = if self.table.plane().is_some() { STEEP_STILL } else { STEEP };
+        if self.ground.plane().is_none_or(|plane| plane.upright(scene.rig) < steep) {
+            self.table.run(&scene.coarse.checked, scene.rig);
+        } else {
+            self.table.reset();
+        }
+    }
+
+    /// What needs no flow, so that it can run beside it: the plane, which is
+    /// searched anew when the frame is the `first` one, and the barriers.
+    pub fn prepare(&mut self, scene: &Scene<'_>, cells: &View, first: bool) {
+        self.find_footing(scene, first);
         self.scale_disparity(&scene.coarse.filled);
         self.barrier.run(&cells.rgb, &self.fourth, &mut self.color, &mut self.relief);
     }
@@ -73,9 +101,13 @@ impl SceneSaliency {
             Some(flow) if self.ego.run(flow, scene, has_depth) => Some(&self.ego),
             _ => None,
         };
-        if let Some(plane) = self.ground.plane() {
+        let footing = self.footing();
+        if let Some(plane) = footing.ground() {
             let motion = motion.map(|ego| &ego.motion);
             self.on_plane.run(plane, scene, &self.color, motion, out);
+        } else if let Some(plane) = footing.table() {
+            let motion = motion.map(|ego| &ego.motion);
+            self.on_table.run(plane, scene, &self.color, motion, out);
         } else {
             let cues = Cues { barrier: &self.color, relief: &self.relief, motion };
             self.without_plane.run(scene, &cues, has_depth, out);
