@@ -31,6 +31,7 @@ mod it {
     mod params;
     #[cfg(feature = "tool")]
     mod picture;
+    #[cfg(feature = "tool")]
     mod pipeline;
     mod preprocess;
     mod reference;

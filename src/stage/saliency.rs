@@ -233,6 +233,9 @@ impl Saliency {
             dispatch!(self.level, _simd => smooth(attention, &before.attention, flow, share));
         }
         previous.set(scene.stamp, &self.cells.gray, attention);
+        if let Mode::Scene(mode) = &self.mode {
+            mode.even_contrast(attention);
+        }
         upsample(attention, self.size, saliency);
     }
 }

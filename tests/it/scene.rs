@@ -1,12 +1,17 @@
 //! Mode `scene`: the ground, what stands on it, and its cues.
 
 use salient_stereo::camera::{Camera, StereoRig};
+use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
+use salient_stereo::perception::View;
 use salient_stereo::simd;
+use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::ground::{Ground, GroundState, cell_centre};
 use salient_stereo::stage::saliency::barrier::{Barrier, ycbcr};
 use salient_stereo::stage::saliency::lateral::Lateral;
+use salient_stereo::stage::saliency::{Previous, Saliency, Scene};
 use salient_stereo::stage::standing::{Standing, Things};
+use salient_stereo::stamp::Stamp;
 
 const SIZE: Size = Size::new(640, 240);
 const F: f64 = 400.0;
@@ -263,4 +268,38 @@ fn a_pole_stands_out_on_both_sides_and_a_wall_on_none() {
     let step = Image::from_fn(size, |x, _| if x < 60 { 20.0 } else { 18.0 });
     Lateral::new(simd::detect()).run(&step, 2.0, 1.0, &mut out);
     assert!((out.get(58, 0) - 0.925 / 7.0).abs() < 1e-5, "{}", out.get(58, 0));
+}
+
+#[test]
+fn a_pale_thing_in_a_still_is_of_interest_and_an_empty_still_is_not() {
+    let size = Size::new(320, 240);
+    let threshold = Config::default().saliency.threshold as f32;
+    // A square a little brighter than what is around it, seen by one camera only.
+    let look = |contrast: u8, frames: usize| {
+        let inside = |x: usize, y: usize| (130..190).contains(&x) && (90..150).contains(&y);
+        let gray = Image::from_fn(size, |x, y| 120 + if inside(x, y) { contrast } else { 0 });
+        let rgb = Image::from_fn(size, |x, y| [gray.get(x, y); 3]);
+        let left = View { gray, rgb, gradient: Image::new(size) };
+        let cells = size.divided_by(4);
+        let coarse = CoarseDisparity {
+            checked: Image::filled(cells, f32::NAN),
+            filled: Image::filled(cells, 0.0),
+        };
+        let mut stage = Saliency::new(&Config::default(), size, simd::detect());
+        let (mut previous, rig) = (Previous::default(), rig());
+        let (mut map, mut pixels) = (Image::default(), Image::default());
+        for frame in 0..frames {
+            let stamp = Stamp(100_000_000 * frame as i64);
+            let scene = Scene { stamp, left: &left, coarse: &coarse, rig: &rig };
+            stage.run(&scene, &mut previous, &mut map, &mut pixels);
+        }
+        map
+    };
+    let most = |map: &Image<f32>| map.pixels().iter().copied().fold(0.0, f32::max);
+    let pale = look(18, 1);
+    assert!(pale.get(40, 30) >= threshold && pale.get(5, 5) < 0.3, "{}", pale.get(40, 30));
+    assert!(most(&look(0, 1)) < 0.3);
+    // What raised the still is not handed on to the frame after it.
+    let next = look(18, 2);
+    assert!(next.get(40, 30) < threshold, "{}", next.get(40, 30));
 }

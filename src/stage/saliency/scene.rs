@@ -19,7 +19,7 @@ use crate::stage::table::Table;
 
 use on_plane::OnPlane;
 use on_table::OnTable;
-use without_plane::{Cues, WithoutPlane};
+use without_plane::{Cues, WithoutPlane, even_contrast};
 
 /// Share of measured cells from which a frame counts as one with depth.
 const LEAST_MEASURED: f32 = 0.15;
@@ -39,6 +39,7 @@ pub struct SceneSaliency {
     on_plane: OnPlane,
     on_table: OnTable,
     without_plane: WithoutPlane,
+    is_still: bool,
     fourth: Image<u8>,
     color: Image<f32>,
     relief: Image<f32>,
@@ -55,6 +56,7 @@ impl SceneSaliency {
             on_plane: OnPlane::new(level),
             on_table: OnTable::default(),
             without_plane: WithoutPlane::default(),
+            is_still: false,
             fourth: Image::default(),
             color: Image::default(),
             relief: Image::default(),
@@ -85,6 +87,14 @@ impl SceneSaliency {
         }
     }
 
+    /// Evens out the contrast of the map where it was that of a still: with
+    /// neither a plane nor motion. Not for the frame after it, which has a scale.
+    pub fn even_contrast(&self, attention: &mut Image<f32>) {
+        if self.is_still {
+            even_contrast(attention);
+        }
+    }
+
     /// What needs no flow, so that it can run beside it: the plane, which is
     /// searched anew when the frame is the `first` one, and the barriers.
     pub fn prepare(&mut self, scene: &Scene<'_>, cells: &View, first: bool) {
@@ -102,6 +112,7 @@ impl SceneSaliency {
             _ => None,
         };
         let footing = self.footing();
+        self.is_still = footing.plane.is_none() && motion.is_none();
         if let Some(plane) = footing.ground() {
             let motion = motion.map(|ego| &ego.motion);
             self.on_plane.run(plane, scene, &self.color, motion, out);

@@ -2,6 +2,7 @@
 //! centre, or moves by itself.
 
 use crate::image::Image;
+use crate::stage::roi::threshold::otsu;
 use crate::stage::saliency::AttentionScene;
 use crate::stage::saliency::boundary::Boundary;
 use crate::stage::saliency::ego::EgoMotion;
@@ -23,6 +24,11 @@ const FULL_BOUNDARY: f32 = 12.0;
 const RELIEF: f32 = 0.1;
 /// What rests is worth beside what moves as this to this and 1.
 const REST: f32 = 0.5;
+
+/// Where the two classes of a still are to be parted, and the least value at
+/// which they are taken for two.
+const CLASSES_PART: f32 = 0.55;
+const LEAST_CLASSES_PART: f32 = 0.3;
 
 /// What the mode knows of a frame, per cell.
 pub struct Cues<'a> {
@@ -87,5 +93,40 @@ impl WithoutPlane {
                 *out = (appearance * (-spread * (u * u + v * v)).exp() * stirs).min(1.0);
             }
         }
+    }
+}
+
+/// Raises the map of a still until the threshold that parts its two classes best
+/// (Otsu 1979) comes to .55, where attention is cut by default: pictures of low
+/// contrast have no fixed scale. Below .3 it does not take them for two
+/// classes, so that nothing comes of nothing, and it lowers no map.
+pub fn even_contrast(map: &mut Image<f32>) {
+    let gain = CLASSES_PART / otsu(map).clamp(LEAST_CLASSES_PART, CLASSES_PART);
+    for s in map.pixels_mut() {
+        *s = (*s * gain).min(1.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Size;
+
+    #[test]
+    fn low_contrast_is_raised_to_the_threshold_and_noise_is_not() {
+        let two = |low: f32, high: f32| {
+            let mut map = Image::from_fn(Size::new(20, 20), |x, _| if x < 15 { low } else { high });
+            even_contrast(&mut map);
+            (map.get(0, 0), map.get(19, 0))
+        };
+        let (low, high) = two(0.1, 0.35);
+        assert!(low < 0.2 && high >= 0.55, "{low} {high}");
+        let (low, high) = two(0.45, 0.52);
+        assert!(low < 0.55 && high >= 0.55, "{low} {high}");
+        // Nothing comes of nothing, and what is well parted is not lowered.
+        assert!(two(0.02, 0.25).1 < 0.5);
+        assert_eq!(two(0.2, 0.2), (0.2, 0.2));
+        let (low, high) = two(0.6, 0.9);
+        assert_eq!((low, high), (0.6, 0.9));
     }
 }
