@@ -25,8 +25,8 @@ const LONGEST_GAP: f64 = 5.0;
 /// are at the same distance: in parts, and pixels.
 const SAME_PART: f32 = 0.1;
 const SAME_PX: f32 = 1.0;
-/// Share of a prediction's pixels that may speak against it.
-const MOST_AGAINST: f32 = 0.4;
+/// Share of a prediction's pixels that must speak for it.
+const LEAST_FOR: f32 = 0.5;
 
 /// A track and a region that may be the same thing.
 #[derive(Clone, Copy, Debug)]
@@ -106,10 +106,12 @@ impl Track {
     /// confidence falls to one half over that time. A track that ends without
     /// ever having been active is counted as `unstable`.
     ///
-    /// Where `disparity` (pixels, NaN where there is none) shows through the
-    /// predicted place what lies behind it, or regions of this frame at the
-    /// same distance cover it by their pixels in `labels`, the thing is not
-    /// there (or has another identity), and nothing is published.
+    /// It is published only where the thing probably still is: at least half of
+    /// its predicted pixels must show in `disparity` (pixels, NaN where there is
+    /// none) its own distance, outside of the regions of this frame in `labels`,
+    /// or something nearer that hides it. What lies behind it, a region at the same
+    /// distance (the thing under another identity) and what was not measured
+    /// do not speak for it. Things that never had a position are published.
     ///
     /// A stamp that goes back, or more than 5 s ahead, resets the tracker.
     pub fn run(
@@ -226,7 +228,7 @@ impl Track {
                 regions.truncate(regions.len() - 1);
                 continue;
             }
-            if views.refute(region, rig) {
+            if !views.bear_out(region, rig) {
                 regions.truncate(regions.len() - 1);
                 continue;
             }
@@ -250,13 +252,16 @@ pub struct Views<'a> {
 }
 
 impl Views<'_> {
-    /// True when too much of the mask of a predicted region shows something
-    /// farther away, or belongs to a seen region at the same distance.
-    fn refute(&self, region: &Region, rig: &StereoRig) -> bool {
+    /// True when enough of the mask of a predicted region shows something at its
+    /// distance that is no seen region, or something nearer.
+    fn bear_out(&self, region: &Region, rig: &StereoRig) -> bool {
+        if region.position[2].is_nan() {
+            return true;
+        }
         let expected = (rig.depth_scale() / region.position[2]) as f32;
         let tolerance = (SAME_PART * expected).max(SAME_PX);
         let (x, width) = (region.x as usize, region.width as usize);
-        let mut against = 0;
+        let mut supported = 0;
         for (dy, mask) in region.mask.chunks_exact(width.max(1)).enumerate() {
             let y = region.y as usize + dy;
             let disparity = &self.disparity.row(y)[x..x + width];
@@ -265,12 +270,12 @@ impl Views<'_> {
                 disparity.iter().zip(labels).zip(mask).filter(|(_, mask)| **mask != 0)
             {
                 // NaN is neither.
-                let behind = d < expected - tolerance;
-                let taken = label != 0 && (d - expected).abs() <= tolerance;
-                against += u32::from(behind || taken);
+                let hidden = d > expected + tolerance;
+                let there = label == 0 && d >= expected - tolerance;
+                supported += u32::from(hidden || there);
             }
         }
-        against as f32 > MOST_AGAINST * region.area as f32
+        supported as f32 >= LEAST_FOR * region.area as f32
     }
 }
 

@@ -63,7 +63,7 @@ struct Driver {
     track: Track,
     rig: StereoRig,
     rejections: Rejections,
-    /// What is measured; nothing at first.
+    /// What is measured; at first something near that hides everything.
     disparity: Image<f32>,
     labels: Image<u16>,
 }
@@ -74,7 +74,7 @@ impl Driver {
             track: Track::new(config),
             rig: rig(),
             rejections: Rejections::default(),
-            disparity: Image::filled(SIZE, f32::NAN),
+            disparity: Image::filled(SIZE, 200.0),
             labels: Image::new(SIZE),
         }
     }
@@ -273,10 +273,10 @@ fn switched_off_it_gives_no_ids() {
 }
 
 #[test]
-fn a_prediction_is_published_unless_what_is_measured_speaks_against_it() {
+fn a_prediction_is_published_where_what_is_measured_speaks_for_it() {
     // 25 px at 8 m.
     for (disparity, labelled, published) in [
-        (f32::NAN, false, true),
+        (f32::NAN, false, false),
         (60.0, true, true),
         (25.0, false, true),
         (12.0, false, false),
