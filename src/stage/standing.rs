@@ -4,13 +4,16 @@ pub mod column;
 pub mod join;
 
 use crate::camera::StereoRig;
-use crate::image::Image;
-use crate::stage::coarse::CELL;
+use crate::image::{Image, Size};
 use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
 use column::{Columns, Segment, Top};
 use join::Join;
 
+/// Pixels that a cell is wide: poles, legs and the gaps between things are narrow.
+pub const WIDE: usize = 2;
+/// Pixels that a cell is high: what stands is higher than wide.
+pub const HIGH: usize = 4;
 /// Share of its columns from which a thing that goes on upward is part of a
 /// building, if it is wider than a trunk or a pole, metres.
 const MOST_TALL: f32 = 0.5;
@@ -24,9 +27,9 @@ const LEAST_CONTACT: f32 = 0.2;
 /// Share of a thing's cells that its box leaves out on every side.
 const TRIM: f32 = 0.04;
 /// Cells beside a thing in which its background is looked for.
-const LOOK_ASIDE: usize = 3;
+const LOOK_ASIDE: usize = 6;
 /// Cells across a pole, at most.
-const MOST_WIDE: usize = 3;
+const MOST_WIDE: usize = 6;
 /// Share of a thing's sides that must be free of anything nearer.
 const LEAST_FREE: f32 = 0.3;
 
@@ -82,7 +85,7 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Things in a map of disparity per cell (full-size pixels, `cx_l - cx_r`
+    /// Things in a map of disparity per cell of [`WIDE`] x [`HIGH`] pixels (full-size pixels, `cx_l - cx_r`
     /// subtracted, NaN where there is none) on `plane`.
     pub fn run(
         &mut self,
@@ -94,7 +97,7 @@ impl Standing {
     ) {
         self.columns.find(disparity, plane);
         let scale = size_scale(plane);
-        self.join.run(&self.columns, scale, rig);
+        self.join.run(disparity, &self.columns, scale, rig);
         self.collect(disparity, scale, rig, least_cells, out);
         self.paint(disparity, out);
     }
@@ -126,14 +129,14 @@ impl Standing {
             self.thing.push(thing);
             let t = &mut out.list[thing as usize - 1];
             let z = depth_scale / s.disparity();
-            let left = (s.x as f32 * CELL as f32 - 0.5 - cx) * z / focal;
+            let left = (s.x as f32 * WIDE as f32 - 0.5 - cx) * z / focal;
             t.cells += s.cells;
             t.columns += 1;
             t.contacts += u32::from(s.contact);
             t.tall += u32::from(s.top == Top::Tall);
             t.covered += u32::from(s.top == Top::Covered);
             t.lateral_m[0] = t.lateral_m[0].min(left);
-            t.lateral_m[1] = t.lateral_m[1].max(left + CELL as f32 * z / focal);
+            t.lateral_m[1] = t.lateral_m[1].max(left + WIDE as f32 * z / focal);
             t.top_m = t.top_m.max(s.top_m);
             t.depth_m = [t.depth_m[0].min(z), t.depth_m[1].max(z)];
             let [free, hidden] = sides(disparity, s);
@@ -234,6 +237,17 @@ impl Standing {
 /// seen: a street from 5 m, a table from less than 1 m.
 pub(crate) fn size_scale(plane: &Plane) -> f32 {
     (plane.distance_m / 5.0).powf(1.4).clamp(0.03, 1.0)
+}
+
+/// Size of the map of cells of an image of `size`.
+pub fn cells(size: Size) -> Size {
+    Size::new(size.width.div_ceil(WIDE), size.height.div_ceil(HIGH))
+}
+
+/// Centre of a cell in full-size pixels.
+#[inline]
+pub fn centre(x: usize, y: usize) -> (f32, f32) {
+    ((x * WIDE) as f32 + (WIDE as f32 - 1.0) / 2.0, (y * HIGH) as f32 + (HIGH as f32 - 1.0) / 2.0)
 }
 
 /// How many cells to the left and to the right of a segment are farther than

@@ -10,7 +10,7 @@ use salient_stereo::stage::ground::{Ground, GroundState, cell_centre};
 use salient_stereo::stage::saliency::barrier::{Barrier, ycbcr};
 use salient_stereo::stage::saliency::lateral::Lateral;
 use salient_stereo::stage::saliency::{Previous, Saliency, Scene};
-use salient_stereo::stage::standing::{Standing, Things};
+use salient_stereo::stage::standing::{self, Standing, Things};
 use salient_stereo::stamp::Stamp;
 
 const SIZE: Size = Size::new(640, 240);
@@ -31,8 +31,18 @@ fn rig() -> StereoRig {
 /// A street under a camera rolled by `roll` radians, with a wall at 40 m and
 /// boxes of (left, right, bottom and top above the ground, distance) in metres.
 fn street(roll: f64, boxes: &[[f64; 5]]) -> Image<f32> {
-    Image::from_fn(SIZE.divided_by(4), |x, y| {
-        let (u, v) = cell_centre(x, y);
+    view(roll, boxes, SIZE.divided_by(4), cell_centre)
+}
+
+/// The same in cells of another shape.
+fn view(
+    roll: f64,
+    boxes: &[[f64; 5]],
+    cells: Size,
+    centre: impl Fn(usize, usize) -> (f32, f32),
+) -> Image<f32> {
+    Image::from_fn(cells, |x, y| {
+        let (u, v) = centre(x, y);
         let (u, v) = (f64::from(u) - 320.0, f64::from(v) - HORIZON);
         // Down in the world, from the rolled camera.
         let down = v * roll.cos() + u * roll.sin();
@@ -154,24 +164,48 @@ fn a_table_is_a_ground_from_any_angle_and_a_cloth_before_the_camera_is_none() {
     assert_eq!(ground.state(), GroundState::None);
 }
 
+/// An upright street as the former of regions sees it.
+fn upright(boxes: &[[f64; 5]]) -> Image<f32> {
+    view(0.0, boxes, standing::cells(SIZE), standing::centre)
+}
+
+/// What stands on the street.
+fn things(disparity: &Image<f32>) -> Things {
+    let rig = rig();
+    let mut ground = Ground::default();
+    ground.run(&street(0.0, &[]), &rig);
+    let plane = *ground.plane().expect("a street has a ground");
+    let mut things = Things::default();
+    Standing::default().run(disparity, &plane, &rig, 4, &mut things);
+    things
+}
+
+#[test]
+fn what_is_seen_between_two_things_parts_them() {
+    // Two people, 0.3 m between them.
+    let people = [[-0.65, -0.15, 0.0, 1.7, 10.0], [0.15, 0.65, 0.0, 1.7, 10.0]];
+    let seen = upright(&people);
+    assert_eq!(things(&seen).list.len(), 2);
+    // What was not measured there may be a part of one thing.
+    let people = Image::from_fn(seen.size(), |x, y| {
+        let (u, _) = standing::centre(x, y);
+        if (u - 320.0).abs() < 0.15 / 10.0 * F as f32 { f32::NAN } else { seen.get(x, y) }
+    });
+    assert_eq!(things(&people).list.len(), 1);
+}
+
 #[test]
 fn what_stands_is_found_and_what_floats_is_counted() {
-    let rig = rig();
     // A car, a pole, and a sign board that nothing carries, far apart.
     let boxes =
         [[-3.5, -1.5, 0.0, 1.5, 9.0], [1.4, 1.7, 0.0, 2.2, 7.0], [4.0, 6.0, 1.4, 2.4, 12.0]];
-    let disparity = street(0.0, &boxes);
-    let mut ground = Ground::default();
-    ground.run(&disparity, &rig);
-    let plane = *ground.plane().expect("a street has a ground");
-    let mut things = Things::default();
-    Standing::default().run(&disparity, &plane, &rig, 4, &mut things);
+    let things = things(&upright(&boxes));
 
     let at = |[left, right, bottom, top, distance]: [f64; 5]| {
         let (x, h) = (left.midpoint(right), bottom.midpoint(top));
         let u = 320.0 + F * x / distance;
         let v = HORIZON + F * (HEIGHT - h) / distance;
-        things.ids.get(u as usize / 4, v as usize / 4)
+        things.ids.get(u as usize / standing::WIDE, v as usize / standing::HIGH)
     };
     let (car, pole) = (at(boxes[0]), at(boxes[1]));
     assert!(car != 0 && pole != 0 && car != pole);
@@ -180,21 +214,15 @@ fn what_stands_is_found_and_what_floats_is_counted() {
     assert!((car.lateral_m[0] + 3.5).abs() < 0.2 && (car.lateral_m[1] + 1.5).abs() < 0.2);
     assert!((car.top_m - 1.5).abs() < 0.15 && (car.depth_m[0] - 9.0).abs() < 0.2);
     // The ground itself is none of them.
-    assert_eq!(things.ids.get(80, 58), 0);
+    assert_eq!(things.ids.get(320 / standing::WIDE, 232 / standing::HIGH), 0);
 }
 
 #[test]
 fn parked_cars_are_two_and_the_house_behind_them_is_none() {
-    let rig = rig();
     // Two cars one behind the other, and a house front that goes up out of the picture.
     let boxes =
         [[1.6, 3.4, 0.0, 1.5, 6.0], [1.6, 3.4, 0.0, 1.5, 12.0], [-9.0, 9.0, 0.0, 9.0, 20.0]];
-    let disparity = street(0.0, &boxes);
-    let mut ground = Ground::default();
-    ground.run(&disparity, &rig);
-    let plane = *ground.plane().expect("a street has a ground");
-    let mut things = Things::default();
-    Standing::default().run(&disparity, &plane, &rig, 4, &mut things);
+    let things = things(&upright(&boxes));
     let nearest: Vec<_> = things.list.iter().map(|t| t.depth_m[0].round()).collect();
     assert_eq!(nearest, [12.0, 6.0]);
 }

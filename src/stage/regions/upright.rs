@@ -4,38 +4,17 @@ use super::RegionSource;
 use super::components::{Candidates, tolerance};
 use crate::image::Image;
 use crate::perception::Rejections;
-use crate::simd::{Level, Simd, dispatch, f32x4, prelude::*};
+use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CELL;
 use crate::stage::ground::Plane;
-use crate::stage::standing::{Standing, Things};
+use crate::stage::standing::{HIGH, Standing, Things, WIDE, cells};
 
 /// Places in a cell whose disparities are asked; their median is the cell's.
-const SAMPLES: [(usize, usize); 8] =
-    [(0, 0), (2, 0), (1, 1), (3, 1), (0, 2), (2, 2), (1, 3), (3, 3)];
-/// Batcher's odd-even merge sort of as many (Batcher 1968).
-const EXCHANGES: [(usize, usize); 19] = [
-    (0, 1),
-    (2, 3),
-    (4, 5),
-    (6, 7),
-    (0, 2),
-    (1, 3),
-    (4, 6),
-    (5, 7),
-    (1, 2),
-    (5, 6),
-    (0, 4),
-    (1, 5),
-    (2, 6),
-    (3, 7),
-    (2, 4),
-    (3, 5),
-    (1, 2),
-    (3, 4),
-    (5, 6),
-];
+const SAMPLES: [(usize, usize); 4] = [(0, 0), (1, 1), (0, 2), (1, 3)];
+/// A sorting network of as many (Batcher 1968).
+const EXCHANGES: [(usize, usize); 5] = [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)];
 /// Samples with disparity that a cell needs.
-const LEAST_SAMPLES: usize = 3;
+const LEAST_SAMPLES: usize = 2;
 /// Share of a thing's cells that must be salient.
 const LEAST_SALIENT: f32 = 0.3;
 /// Largest difference of a pixel from its surface in parts of the disparity.
@@ -53,6 +32,10 @@ pub struct Upright {
     standing: Standing,
     things: Things,
     cells: Image<f32>,
+    /// 1 for cells whose disparity is a fine one.
+    fine: Image<u8>,
+    /// Per cell of a row: holes in it are inside of the thing.
+    inside: Vec<bool>,
     salient: Vec<u32>,
     number: Vec<u32>,
 }
@@ -65,6 +48,8 @@ impl Upright {
             standing: Standing::default(),
             things: Things::default(),
             cells: Image::default(),
+            fine: Image::default(),
+            inside: Vec::new(),
             salient: Vec::new(),
             number: Vec::new(),
         }
@@ -81,7 +66,7 @@ impl Upright {
         rejections: &mut Rejections,
     ) {
         self.shrink(source);
-        let least_cells = (min_area / (CELL * CELL)).max(1) as u32;
+        let least_cells = (min_area / (WIDE * HIGH)).max(1) as u32;
         self.standing.run(&self.cells, plane, source.rig, least_cells, &mut self.things);
         let count = self.choose(&source.roi.salient);
         self.paint(plane, source, count, out);
@@ -93,21 +78,21 @@ impl Upright {
     /// The median disparity of each cell inside the region of interest.
     fn shrink(&mut self, source: &RegionSource<'_>) {
         let size = source.disparity.size();
-        self.cells.resize(size.divided_by(CELL));
+        self.cells.resize(cells(size));
+        self.fine.resize(cells(size));
         let offset = source.rig.disparity_offset() as f32;
         for cy in 0..self.cells.height() {
             // Rows of the cell inside the image, and whether any is matched.
-            let rows: [usize; CELL] = std::array::from_fn(|i| (cy * CELL + i).min(size.height - 1));
-            let matched = [rows[0], rows[CELL - 1]].map(|y| source.roi.matched.row(y));
+            let rows: [usize; HIGH] = std::array::from_fn(|i| (cy * HIGH + i).min(size.height - 1));
+            let matched = [rows[0], rows[HIGH - 1]].map(|y| source.roi.matched.row(y));
             let disparity = rows.map(|y| source.disparity.row(y));
             let coarse = source.coarse.checked.row(cy);
             let cells = self.cells.row_mut(cy).chunks_mut(LANES);
-            for ((cells, coarse), first) in
-                cells.zip(coarse.chunks(LANES)).zip((0..).step_by(LANES))
-            {
+            let kinds = self.fine.row_mut(cy).chunks_mut(LANES);
+            for ((cells, kinds), first) in cells.zip(kinds).zip((0..).step_by(LANES)) {
                 let any = |cell: usize| {
-                    let from = (first + cell) * CELL;
-                    let last = (from + CELL - 1).min(size.width - 1);
+                    let from = (first + cell) * WIDE;
+                    let last = (from + WIDE - 1).min(size.width - 1);
                     matched.iter().any(|row| row[from] != 0 || row[last] != 0)
                 };
                 let fine: [bool; LANES] =
@@ -115,14 +100,15 @@ impl Upright {
                 let mut medians = [f32::NAN; LANES];
                 if fine.contains(&true) {
                     dispatch!(self.level, _simd => {
-                        medians_of(&disparity, first * CELL, &mut medians);
+                        medians_of(&disparity, first * WIDE, &mut medians);
                     });
                 }
-                for (((out, coarse), median), fine) in
-                    cells.iter_mut().zip(coarse).zip(medians).zip(fine)
-                {
+                let found = cells.iter_mut().zip(kinds).zip(medians).zip(fine).zip(first..);
+                for ((((out, kind), median), fine), x) in found {
                     // What was not matched finely is known coarsely.
-                    *out = if fine && !median.is_nan() { median } else { coarse - offset };
+                    let measured = fine && !median.is_nan();
+                    *kind = u8::from(measured);
+                    *out = if measured { median } else { coarse[x * WIDE / CELL] - offset };
                 }
             }
         }
@@ -135,10 +121,10 @@ impl Upright {
         self.number.clear();
         self.number.resize(self.things.list.len(), 0);
         for cy in 0..self.things.ids.height() {
-            let pixels = salient.row((cy * CELL + CELL / 2).min(salient.height() - 1));
+            let pixels = salient.row((cy * HIGH + HIGH / 2).min(salient.height() - 1));
             for (cx, &id) in self.things.ids.row(cy).iter().enumerate() {
                 if id != 0 {
-                    let at = (cx * CELL + CELL / 2).min(pixels.len() - 1);
+                    let at = (cx * WIDE + WIDE / 2).min(pixels.len() - 1);
                     self.number[id as usize - 1] += 1;
                     self.salient[id as usize - 1] += u32::from(pixels[at] != 0);
                 }
@@ -170,6 +156,7 @@ impl Upright {
         let (ids, surface) = (&self.things.ids, &self.things.surface);
         for cy in 0..ids.height() {
             let (row, surfaces) = (ids.row(cy), surface.row(cy));
+            enclose(row, self.fine.row(cy), &mut self.inside);
             let below = if cy + 1 < ids.height() { ids.row(cy + 1) } else { &[] };
             for cx in 0..row.len() {
                 let left = if cx > 0 { row[cx - 1] } else { 0 };
@@ -185,14 +172,34 @@ impl Upright {
                 let own = row[cx] != 0;
                 // What only one camera sees at the sides of a thing belongs to
                 // what is behind it.
-                let interior =
-                    own && (cx == 0 || left == id) && (cx + 1 == row.len() || right == id);
+                let interior = own && self.inside[cx];
                 let tolerance =
                     if own { (SURFACE_PART * surface).max(SURFACE_PX) } else { tolerance(surface) };
                 let cell =
-                    Cell { x: cx * CELL, y: cy * CELL, id, own, interior, surface, tolerance };
-                dispatch!(self.level, simd => cell.paint(simd, plane, source, out));
+                    Cell { x: cx * WIDE, y: cy * HIGH, id, own, interior, surface, tolerance };
+                cell.paint(plane, source, out);
             }
+        }
+    }
+}
+
+/// Which cells of a row have fine cells of their own thing on both sides (or
+/// the edge of the image) before those of anything else. What only one camera
+/// sees at the sides of a thing belongs to what is behind it.
+fn enclose(ids: &[u32], fine: &[u8], inside: &mut Vec<bool>) {
+    inside.clear();
+    inside.resize(ids.len(), true);
+    pass(ids.iter().zip(fine).zip(inside.iter_mut()));
+    pass(ids.iter().zip(fine).zip(inside.iter_mut()).rev());
+}
+
+/// The same for the side that the cells come from.
+fn pass<'a>(cells: impl Iterator<Item = ((&'a u32, &'a u8), &'a mut bool)>) {
+    let mut last = None;
+    for ((id, fine), inside) in cells {
+        *inside &= last.is_none_or(|last| last == id);
+        if *fine != 0 {
+            last = Some(id);
         }
     }
 }
@@ -206,7 +213,7 @@ struct Cell {
     id: u32,
     /// It is one of the thing's own; else it lies beside or above one.
     own: bool,
-    /// So are its neighbours to the left and to the right.
+    /// Holes in it are inside of the thing.
     interior: bool,
     /// Disparity of the thing there, and how far from it a pixel's may be.
     surface: f32,
@@ -216,31 +223,20 @@ struct Cell {
 impl Cell {
     /// Gives those pixels to the thing that are on its surface, and the holes in it.
     #[inline(always)]
-    fn paint<S: Simd>(
-        &self,
-        simd: S,
-        plane: &Plane,
-        source: &RegionSource<'_>,
-        out: &mut Candidates,
-    ) {
+    fn paint(&self, plane: &Plane, source: &RegionSource<'_>, out: &mut Candidates) {
         let size = source.disparity.size();
-        let columns = (size.width - self.x).min(CELL);
-        for y in self.y..(self.y + CELL).min(size.height) {
+        let columns = (size.width - self.x).min(WIDE);
+        for y in self.y..(self.y + HIGH).min(size.height) {
             // What does not rise above the ground is none of the thing.
-            let ground = plane.disparity(self.x as f32 + 1.5, y as f32) + GROUND_PX;
+            let ground = plane.disparity(self.x as f32 + 0.5, y as f32) + GROUND_PX;
             let unmatched = self.own && source.roi.matched.row(y)[self.x] == 0;
-            let row = &source.disparity.row(y)[self.x..];
-            let pixels: [f32; CELL] = if let Some(pixels) = row.first_chunk() {
-                *pixels
-            } else {
-                let mut pixels = [f32::NAN; CELL];
-                pixels[..columns].copy_from_slice(row);
-                pixels
-            };
-            let d = f32x4::from_slice(simd, &pixels);
-            let on = (d - self.surface).abs().simd_le(self.tolerance) & d.simd_gt(ground);
-            let holes = if self.interior || unmatched { !d.simd_eq(d).to_bitmask() } else { 0 };
-            out.mark(self.id, self.x, y, columns, (on.to_bitmask() | holes) as u32);
+            let holes = self.interior || unmatched;
+            let mut bits = 0;
+            for (i, d) in source.disparity.row(y)[self.x..][..columns].iter().enumerate() {
+                let on = (d - self.surface).abs() <= self.tolerance && *d > ground;
+                bits |= u32::from(on || (holes && d.is_nan())) << i;
+            }
+            out.mark(self.id, self.x, y, columns, bits);
         }
     }
 }
@@ -248,14 +244,14 @@ impl Cell {
 /// Median disparity of some of the pixels of each of several cells, whose rows
 /// are given, from column `from` on; NaN with too few.
 #[inline(always)]
-fn medians_of(rows: &[&[f32]; CELL], from: usize, medians: &mut [f32; LANES]) {
+fn medians_of(rows: &[&[f32]; HIGH], from: usize, medians: &mut [f32; LANES]) {
     // Holes go to the end. Exchanges without branches: which way they go is as
     // random as the noise.
     let last = rows[0].len() - 1;
     let mut sorted = [[0.0_f32; LANES]; SAMPLES.len()];
     for (sample, (dx, dy)) in sorted.iter_mut().zip(SAMPLES) {
         for (cell, d) in sample.iter_mut().enumerate() {
-            *d = rows[dy][(from + cell * CELL + dx).min(last)];
+            *d = rows[dy][(from + cell * WIDE + dx).min(last)];
         }
     }
     let mut n = [0_u32; LANES];
@@ -282,21 +278,31 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_hole_belongs_to_a_thing_that_is_measured_on_both_sides() {
+        // Edge, hole, thing 1, hole, thing 1, hole, thing 2, hole, what is none.
+        let ids = [1, 1, 1, 1, 1, 1, 2, 2, 0];
+        let fine = [0, 0, 1, 0, 1, 0, 1, 0, 1];
+        let mut inside = Vec::new();
+        enclose(&ids, &fine, &mut inside);
+        assert_eq!(inside, [true, true, true, true, false, false, false, false, false]);
+    }
+
+    #[test]
     fn the_median_is_that_of_the_samples_that_there_are() {
         // Every pattern of holes, in each cell another order of the values.
-        for holes in 0_u32..256 {
-            let mut values = [[0.0_f32; LANES * CELL]; CELL];
+        for holes in 0_u32..16 {
+            let mut values = [[0.0_f32; LANES * WIDE]; HIGH];
             let mut kept = [(); LANES].map(|()| Vec::new());
             for (turn, kept) in kept.iter_mut().enumerate() {
                 for (i, (x, y)) in SAMPLES.into_iter().enumerate() {
                     let hole = holes >> i & 1 == 1;
-                    let value = ((i * 5 + turn * 3) % 8) as f32;
-                    values[y][turn * CELL + x] = if hole { f32::NAN } else { value };
+                    let value = ((i * 3 + turn) % 4) as f32;
+                    values[y][turn * WIDE + x] = if hole { f32::NAN } else { value };
                     kept.extend((!hole).then_some(value));
                 }
                 kept.sort_by(f32::total_cmp);
             }
-            let rows: [&[f32]; CELL] = std::array::from_fn(|y| &values[y][..]);
+            let rows: [&[f32]; HIGH] = std::array::from_fn(|y| &values[y][..]);
             let mut found = [0.0; LANES];
             medians_of(&rows, 0, &mut found);
             for (kept, found) in kept.iter().zip(found) {

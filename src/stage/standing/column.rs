@@ -1,8 +1,9 @@
 //! Segments of a column of cells that are one surface above the ground.
 
 use crate::image::Image;
-use crate::stage::ground::{Plane, cell_centre};
+use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
+use crate::stage::standing::centre;
 
 /// Height in metres (of a road scene) from which a cell is above the ground.
 const LOW_M: f32 = 0.2;
@@ -107,7 +108,7 @@ impl Columns {
             }
             let gap = holes;
             holes = 0;
-            let (u, v) = cell_centre(x, y);
+            let (u, v) = centre(x, y);
             let height = plane.height(u, v, d);
             if let Some(s) = &mut open {
                 let near = (d - s.disparity()).abs() <= SEGMENT_PART * s.disparity();
@@ -179,7 +180,7 @@ impl Columns {
         for s in self.segments.iter_mut().filter(|s| s.contact) {
             let mean = s.disparity();
             for y in s.lower as usize..disparity.height() {
-                let (u, v) = cell_centre(s.x as usize, y);
+                let (u, v) = centre(s.x as usize, y);
                 let d = disparity.get(s.x as usize, y);
                 // NaN is no contradiction.
                 let other = (d - mean).abs() > FOOT_PART * mean;

@@ -1,17 +1,22 @@
 //! Which segments are one thing.
 
 use super::column::{Columns, Segment, Top};
+use super::{HIGH, WIDE};
 use crate::camera::StereoRig;
-use crate::stage::coarse::CELL;
+use crate::image::Image;
+use crate::stage::regions::components::tolerance;
 use crate::stage::regions::union_find::UnionFind;
 
-/// Gap in metres across which segments beside each other are one thing.
-const GAP_M: f32 = 0.5;
+/// Gap in metres across which segments beside each other are one thing, if
+/// nothing is seen through it.
+const GAP_M: f32 = 0.4;
+/// Share of a segment's height over which a gap beside it shows what is behind.
+const SEE_THROUGH: f32 = 0.5;
 /// Their difference in depth: metres, in parts of the depth, and in standard
 /// deviations of a segment's disparity, pixels.
 const STEP_M: f32 = 0.5;
 const STEP_PART: f32 = 0.04;
-const STEP_PX: f32 = 0.35;
+const STEP_PX: f32 = 0.2;
 /// Height of a segment that alone is evidence of a thing, metres.
 const STRONG_M: f32 = 0.4;
 /// Share of a part's columns that must stand on another part of the same thing.
@@ -39,33 +44,37 @@ impl Join {
     ///
     /// Where one surface hides another, cells hold a mixture of both. Such
     /// pieces are short: they take a thing, but never make one of two.
-    pub fn run(&mut self, columns: &Columns, scale: f32, rig: &StereoRig) {
+    pub fn run(&mut self, disparity: &Image<f32>, columns: &Columns, scale: f32, rig: &StereoRig) {
         let view = View::new(scale, rig);
         self.places.clear();
         self.places.extend(columns.segments.iter().map(|s| view.place(s)));
         self.strong.clear();
         let least = STRONG_M * scale;
         self.strong.extend(columns.segments.iter().zip(&self.places).map(|(s, place)| {
-            let rows = (s.lower - s.upper) as f32 * CELL as f32;
+            let rows = (s.lower - s.upper) as f32 * HIGH as f32;
             rows * place.distance >= least * view.focal
         }));
         self.sets.reset(columns.segments.len());
-        self.beside(columns, &view);
+        self.beside(disparity, columns, &view);
         self.above(columns, &view);
         self.attach(columns, &view);
     }
 
-    /// Strong segments side by side.
-    fn beside(&mut self, columns: &Columns, view: &View) {
-        let first = &columns.first;
+    /// Strong segments side by side with nothing seen through between them.
+    fn beside(&mut self, disparity: &Image<f32>, columns: &Columns, view: &View) {
+        let Columns { segments, first } = columns;
         for (i, place) in self.places.iter().enumerate().filter(|(i, _)| self.strong[*i]) {
             let column = place.x as usize;
             let reach = view.columns(GAP_M, place);
-            let from = first[column.saturating_sub(reach)] as usize;
-            let others = from..first[column] as usize;
-            for (j, other) in others.clone().zip(&self.places[others]) {
-                if self.strong[j] && view.beside(place, other) {
-                    self.sets.union(j as u32, i as u32);
+            for x in (column.saturating_sub(reach)..column).rev() {
+                let others = first[x] as usize..first[x + 1] as usize;
+                for (j, other) in others.clone().zip(&self.places[others]) {
+                    if self.strong[j] && view.beside(place, other) {
+                        self.sets.union(j as u32, i as u32);
+                    }
+                }
+                if seen_through(disparity, x, &segments[i]) {
+                    break;
                 }
             }
         }
@@ -140,6 +149,14 @@ impl Join {
     }
 }
 
+/// Whether column `x` shows over most of the height of a segment what is behind it.
+fn seen_through(disparity: &Image<f32>, x: usize, s: &Segment) -> bool {
+    let d = s.disparity();
+    let limit = d - tolerance(d);
+    let behind = (s.upper..s.lower).filter(|&y| disparity.get(x, y as usize) < limit).count();
+    behind as f32 > SEE_THROUGH * (s.lower - s.upper) as f32
+}
+
 /// Where a segment is.
 #[derive(Clone, Copy, Debug)]
 struct Place {
@@ -177,9 +194,9 @@ impl View {
         Place { x: s.x, upper: s.upper, lower: s.lower, distance: self.distance(s) }
     }
 
-    /// Columns of cells across `length_m` metres of a road scene at a segment.
+    /// Columns of cells across `length_m` metres of a road scene at a segment, and four pixels.
     fn columns(&self, length_m: f32, s: &Place) -> usize {
-        (length_m * self.scale * self.focal / s.distance / CELL as f32) as usize + 1
+        (length_m * self.scale * self.focal / s.distance / WIDE as f32) as usize + 2
     }
 
     /// Whether segments of different columns are one surface.
@@ -206,7 +223,7 @@ impl View {
 
     /// Columns from the principal point, pixels.
     fn offset(&self, s: &Place) -> f32 {
-        (s.x as usize * CELL) as f32 + 1.5 - self.cx
+        (s.x as usize * WIDE) as f32 + 0.5 - self.cx
     }
 
     /// Whether `upper` is a part of what `lower` is of, in the same column.
