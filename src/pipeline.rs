@@ -174,6 +174,7 @@ impl Pipeline {
         lap.mark(&mut out.times, Stage::Depth);
 
         let source = RegionSource {
+            rgb: &out.left.rgb,
             saliency: &out.saliency,
             roi: &out.roi,
             disparity: &out.disparity,

@@ -5,6 +5,7 @@ pub mod contour;
 pub mod measure;
 pub mod raised;
 pub mod simplify;
+pub mod trim;
 pub mod union_find;
 pub mod upright;
 
@@ -45,6 +46,8 @@ const NEAR_M: f32 = 10.0;
 /// What regions are made from; all images have the same size.
 #[derive(Clone, Copy)]
 pub struct RegionSource<'a> {
+    /// The left view.
+    pub rgb: &'a Image<[u8; 3]>,
     /// Attention map.
     pub saliency: &'a Image<f32>,
     /// Region of interest.

@@ -311,6 +311,7 @@ impl Boxes {
         let roi =
             RoiMask { salient: self.salient.clone(), matched: self.salient.clone(), fraction: 0.5 };
         let source = RegionSource {
+            rgb: &Image::new(self.size),
             saliency: &self.saliency,
             roi: &roi,
             disparity: &self.disparity,

@@ -40,7 +40,8 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
-    const NONE: Self = Self { x0: usize::MAX, y0: usize::MAX, x1: 0, y1: 0, area: 0 };
+    /// No pixel at all.
+    pub const NONE: Self = Self { x0: usize::MAX, y0: usize::MAX, x1: 0, y1: 0, area: 0 };
 
     /// Width in pixels.
     pub const fn width(&self) -> usize {

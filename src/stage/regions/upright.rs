@@ -2,12 +2,13 @@
 
 use super::RegionSource;
 use super::components::{Candidates, tolerance};
+use super::trim::{NARROW_M, Trim};
 use crate::image::Image;
 use crate::perception::Rejections;
 use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CELL;
 use crate::stage::ground::Plane;
-use crate::stage::standing::{HIGH, Standing, Things, WIDE, cells};
+use crate::stage::standing::{HIGH, Standing, Things, WIDE, cells, size_scale};
 
 /// Places in a cell whose disparities are asked; their median is the cell's.
 const SAMPLES: [(usize, usize); 4] = [(0, 0), (1, 1), (0, 2), (1, 3)];
@@ -70,6 +71,7 @@ impl Upright {
         self.standing.run(&self.cells, plane, source.rig, least_cells, &mut self.things);
         let count = self.choose(&source.roi.salient);
         self.paint(plane, source, count, out);
+        self.trim(plane, source, out);
         rejections.floating = self.things.floating;
         rejections.background = self.things.background;
         rejections.not_salient = (self.things.list.len() - count) as u32;
@@ -179,6 +181,21 @@ impl Upright {
                     Cell { x: cx * WIDE, y: cy * HIGH, id, own, interior, surface, tolerance };
                 cell.paint(plane, source, out);
             }
+        }
+    }
+
+    /// Cuts narrow things at the edges that the image shows.
+    fn trim(&self, plane: &Plane, source: &RegionSource<'_>, out: &mut Candidates) {
+        let narrow = NARROW_M * size_scale(plane);
+        for (thing, &id) in self.things.list.iter().zip(&self.number).filter(|(_, id)| **id != 0) {
+            let bounds = &out.boxes[id as usize - 1];
+            let depth = thing.depth_m[0].midpoint(thing.depth_m[1]);
+            let focal = source.rig.focal_px() as f32;
+            if bounds.area == 0 || bounds.width() as f32 * depth > narrow * focal {
+                continue;
+            }
+            let surface = source.rig.depth_scale() as f32 / depth;
+            Trim { rgb: source.rgb, disparity: source.disparity, surface }.run(id, out);
         }
     }
 }
