@@ -13,6 +13,9 @@ use follow::{Box2, Follow};
 /// Squared Mahalanobis distance beyond which two positions are not the same
 /// point: 99.9 % of the chi-squared distribution with 3 degrees of freedom.
 const GATE: f64 = 16.27;
+/// Share of the smaller box inside the other one from which a region may be a part
+/// of a thing, or a thing with a part of another.
+const PART: f32 = 0.7;
 /// Where boxes overlap too little, positions may continue a track up to this
 /// many times the larger lateral extent of the object.
 const REACH: f64 = 1.0;
@@ -282,8 +285,9 @@ impl Views<'_> {
 /// How well a region continues a track, higher is better; `None` when it does not.
 ///
 /// Boxes that overlap by `min_iou` score `1 + IoU`, lowered by the distance in
-/// space; boxes that do not score by that distance alone, if it is small
-/// against the object itself.
+/// space; of boxes one of which lies in the other, as when a thing is seen in part or
+/// together with another one for a frame, half as much. Boxes that do neither score
+/// by that distance alone, if it is small against the object itself.
 fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     let bounds = Box2::of(region);
     let iou = track.bounds.iou(&bounds);
@@ -295,6 +299,9 @@ fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
         return Some((1.0 + iou) / (1.0 + distance.unwrap_or(0.0) / GATE) as f32);
     }
     let (kalman, distance) = (track.kalman.as_ref()?, distance?);
+    if track.bounds.inside(&bounds) >= PART {
+        return Some(0.5 * (1.0 + iou) / (1.0 + distance / GATE) as f32);
+    }
     let estimate = kalman.position();
     let metres = (0..3).map(|i| (estimate[i] - region.position[i]).powi(2)).sum::<f64>().sqrt();
     let lateral = region.extent[0].max(region.extent[1]);

@@ -262,6 +262,26 @@ fn regions_without_depth_are_followed_by_their_boxes() {
 }
 
 #[test]
+fn a_thing_seen_in_part_keeps_its_id() {
+    // A person of whom only the legs are seen for a frame, a person whose region takes
+    // in the wall beside it, and one who is somewhere else.
+    for (at, size, same) in [
+        ([0.0, 0.9, 8.0], [0.6, 0.5], true),
+        ([0.9, 0.3, 8.0], [2.4, 1.7], true),
+        ([0.9, 0.9, 8.0], [0.6, 0.5], false),
+    ] {
+        let mut driver = Driver::new(&Config::default());
+        for frame in 0..5 {
+            driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
+        }
+        let list = driver.frame(0.5, &[Thing { at, size }]);
+        assert_eq!(list[0].track_id == 1, same, "{at:?}");
+        let list = driver.frame(0.6, &[person(0.0, 8.0)]);
+        assert_eq!(list[0].track_id, 1);
+    }
+}
+
+#[test]
 fn switched_off_it_gives_no_ids() {
     let mut config = Config::default();
     config.tracking.enabled = false;

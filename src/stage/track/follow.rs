@@ -31,13 +31,24 @@ impl Box2 {
 
     /// Intersection over union, 0..=1.
     pub fn iou(&self, other: &Self) -> f32 {
+        let both = self.both(other);
+        let either = self.width * self.height + other.width * other.height - both;
+        if either > 0.0 { both / either } else { 0.0 }
+    }
+
+    /// Share of the smaller of both that lies in the other one, 0..=1.
+    pub fn inside(&self, other: &Self) -> f32 {
+        let smaller = (self.width * self.height).min(other.width * other.height);
+        if smaller > 0.0 { self.both(other) / smaller } else { 0.0 }
+    }
+
+    /// Pixels in both.
+    fn both(&self, other: &Self) -> f32 {
         let overlap = |a: f32, a_len: f32, b: f32, b_len: f32| {
             ((a + a_len).min(b + b_len) - a.max(b)).max(0.0)
         };
-        let both = overlap(self.x, self.width, other.x, other.width)
-            * overlap(self.y, self.height, other.y, other.height);
-        let either = self.width * self.height + other.width * other.height - both;
-        if either > 0.0 { both / either } else { 0.0 }
+        overlap(self.x, self.width, other.x, other.width)
+            * overlap(self.y, self.height, other.y, other.height)
     }
 
     fn centre(&self) -> [f32; 2] {
