@@ -13,9 +13,6 @@ use follow::{Box2, Follow};
 /// Squared Mahalanobis distance beyond which two positions are not the same
 /// point: 99.9 % of the chi-squared distribution with 3 degrees of freedom.
 const GATE: f64 = 16.27;
-/// Share of the smaller box inside the other one from which a region may be a part
-/// of a thing, or a thing with a part of another.
-const PART: f32 = 0.7;
 /// Where boxes overlap too little, positions may continue a track up to this
 /// many times the larger lateral extent of the object.
 const REACH: f64 = 1.0;
@@ -299,7 +296,7 @@ fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
         return Some((1.0 + iou) / (1.0 + distance.unwrap_or(0.0) / GATE) as f32);
     }
     let (kalman, distance) = (track.kalman.as_ref()?, distance?);
-    if track.bounds.inside(&bounds) >= PART {
+    if track.bounds.is_part(&bounds) {
         return Some(0.5 * (1.0 + iou) / (1.0 + distance / GATE) as f32);
     }
     let estimate = kalman.position();

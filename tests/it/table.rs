@@ -230,6 +230,7 @@ fn regions_are_what_stands_off_the_plane_with_its_holes() {
     let mut depth = Image::default();
     Depth::new(&config).run(&disparity, &rig, &mut depth);
     let source = RegionSource {
+        rgb: &Image::new(SIZE),
         saliency: &Image::filled(SIZE, 0.8),
         roi: &RoiMask { salient: salient.clone(), matched: salient, fraction: 1.0 },
         disparity: &disparity,

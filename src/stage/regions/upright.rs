@@ -5,7 +5,7 @@ use super::components::{Candidates, tolerance};
 use super::trim::{NARROW_M, Trim};
 use crate::image::Image;
 use crate::perception::Rejections;
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x4, prelude::*};
 use crate::stage::coarse::CELL;
 use crate::stage::ground::Plane;
 use crate::stage::standing::{HIGH, Standing, Things, WIDE, cells, size_scale};
@@ -158,28 +158,36 @@ impl Upright {
         let (ids, surface) = (&self.things.ids, &self.things.surface);
         for cy in 0..ids.height() {
             let (row, surfaces) = (ids.row(cy), surface.row(cy));
-            enclose(row, self.fine.row(cy), &mut self.inside);
             let below = if cy + 1 < ids.height() { ids.row(cy + 1) } else { &[] };
-            for cx in 0..row.len() {
+            if row.iter().chain(below).all(|id| *id == 0) {
+                continue;
+            }
+            enclose(row, self.fine.row(cy), &mut self.inside);
+            let inside = &self.inside;
+            let cell = |cx: usize| {
                 let left = if cx > 0 { row[cx - 1] } else { 0 };
                 let right = row.get(cx + 1).copied().unwrap_or(0);
                 let low = below.get(cx).copied().unwrap_or(0);
-                let (id, surface) = match (row[cx], left, right, low) {
-                    (0, 0, 0, 0) => continue,
+                let (id, surface) = match (row.get(cx).copied().unwrap_or(0), left, right, low) {
+                    (0, 0, 0, 0) => return Cell::NONE,
                     (0, 0, 0, id) => (id, surface.get(cx, cy + 1)),
                     (0, 0, id, _) => (id, surfaces[cx + 1]),
-                    (0, id, _, _) => (id, surfaces[cx - 1]),
+                    (0, id, ..) if cx < row.len() => (id, surfaces[cx - 1]),
+                    (0, ..) => return Cell::NONE,
                     (own, ..) => (own, surfaces[cx]),
                 };
                 let own = row[cx] != 0;
-                // What only one camera sees at the sides of a thing belongs to
-                // what is behind it.
-                let interior = own && self.inside[cx];
+                let interior = own && inside[cx];
                 let tolerance =
                     if own { (SURFACE_PART * surface).max(SURFACE_PX) } else { tolerance(surface) };
-                let cell =
-                    Cell { x: cx * WIDE, y: cy * HIGH, id, own, interior, surface, tolerance };
-                cell.paint(plane, source, out);
+                Cell { id, own, interior, surface, tolerance }
+            };
+            for cx in (0..row.len()).step_by(2) {
+                let pair = [cell(cx), cell(cx + 1)];
+                if pair.iter().any(|cell| cell.id != 0) {
+                    let at = [cx * WIDE, cy * HIGH];
+                    dispatch!(self.level, simd => paint(simd, &pair, at, plane, source, out));
+                }
             }
         }
     }
@@ -222,11 +230,9 @@ fn pass<'a>(cells: impl Iterator<Item = ((&'a u32, &'a u8), &'a mut bool)>) {
 }
 
 /// A cell that may have pixels of a thing.
+#[derive(Clone, Copy)]
 struct Cell {
-    /// Its left upper pixel.
-    x: usize,
-    y: usize,
-    /// The thing's number.
+    /// The thing's number, 0 for none.
     id: u32,
     /// It is one of the thing's own; else it lies beside or above one.
     own: bool,
@@ -238,22 +244,56 @@ struct Cell {
 }
 
 impl Cell {
-    /// Gives those pixels to the thing that are on its surface, and the holes in it.
-    #[inline(always)]
-    fn paint(&self, plane: &Plane, source: &RegionSource<'_>, out: &mut Candidates) {
-        let size = source.disparity.size();
-        let columns = (size.width - self.x).min(WIDE);
-        for y in self.y..(self.y + HIGH).min(size.height) {
-            // What does not rise above the ground is none of the thing.
-            let ground = plane.disparity(self.x as f32 + 0.5, y as f32) + GROUND_PX;
-            let unmatched = self.own && source.roi.matched.row(y)[self.x] == 0;
-            let holes = self.interior || unmatched;
-            let mut bits = 0;
-            for (i, d) in source.disparity.row(y)[self.x..][..columns].iter().enumerate() {
-                let on = (d - self.surface).abs() <= self.tolerance && *d > ground;
-                bits |= u32::from(on || (holes && d.is_nan())) << i;
+    const NONE: Self =
+        Self { id: 0, own: false, interior: false, surface: f32::NAN, tolerance: 0.0 };
+}
+
+/// Gives those pixels of two cells side by side, the left upper one of which is
+/// `at`, to their things that are on their surfaces, and the holes in them.
+#[inline(always)]
+fn paint<S: Simd>(
+    simd: S,
+    pair: &[Cell; 2],
+    [x, y]: [usize; 2],
+    plane: &Plane,
+    source: &RegionSource<'_>,
+    out: &mut Candidates,
+) {
+    let size = source.disparity.size();
+    let columns = (size.width - x).min(2 * WIDE);
+    let four = |of: [f32; 2]| f32x4::from_slice(simd, &[of[0], of[0], of[1], of[1]]);
+    let surface = four(pair.map(|cell| cell.surface));
+    let tolerance = four(pair.map(|cell| cell.tolerance));
+    for y in y..(y + HIGH).min(size.height) {
+        // What does not rise above the ground is none of the thing.
+        let ground = four([0, WIDE].map(|dx| plane.disparity((x + dx) as f32 + 0.5, y as f32)));
+        let row = &source.disparity.row(y)[x..];
+        let pixels: [f32; 2 * WIDE] = if let Some(pixels) = row.first_chunk() {
+            *pixels
+        } else {
+            let mut pixels = [f32::NAN; 2 * WIDE];
+            pixels[..columns].copy_from_slice(row);
+            pixels
+        };
+        let d = f32x4::from_slice(simd, &pixels);
+        let on = (d - surface).abs().simd_le(tolerance) & d.simd_gt(ground + GROUND_PX);
+        let matched = source.roi.matched.row(y);
+        let mut filled = 0;
+        for (i, cell) in pair.iter().enumerate() {
+            let unmatched = cell.own && matched[(x + i * WIDE).min(size.width - 1)] == 0;
+            filled |= if cell.interior || unmatched { 0b11 << (i * WIDE) } else { 0 };
+        }
+        let bits = (on.to_bitmask() | (!d.simd_eq(d).to_bitmask() & filled)) as u32;
+        let [left, right] = pair.map(|cell| cell.id);
+        if left == right {
+            out.mark(left, x, y, columns, bits);
+        } else {
+            if left != 0 {
+                out.mark(left, x, y, columns.min(WIDE), bits);
             }
-            out.mark(self.id, self.x, y, columns, bits);
+            if right != 0 {
+                out.mark(right, x + WIDE, y, columns - WIDE, bits >> WIDE);
+            }
         }
     }
 }

@@ -68,12 +68,14 @@ impl Join {
             let reach = view.columns(GAP_M, place);
             for x in (column.saturating_sub(reach)..column).rev() {
                 let others = first[x] as usize..first[x + 1] as usize;
+                let mut joined = false;
                 for (j, other) in others.clone().zip(&self.places[others]) {
                     if self.strong[j] && view.beside(place, other) {
                         self.sets.union(j as u32, i as u32);
+                        joined = true;
                     }
                 }
-                if seen_through(disparity, x, &segments[i]) {
+                if !joined && seen_through(disparity, x, &segments[i]) {
                     break;
                 }
             }

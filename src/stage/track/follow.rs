@@ -36,10 +36,11 @@ impl Box2 {
         if either > 0.0 { both / either } else { 0.0 }
     }
 
-    /// Share of the smaller of both that lies in the other one, 0..=1.
-    pub fn inside(&self, other: &Self) -> f32 {
+    /// True when most of one of them lies in the other, larger one: a thing seen in
+    /// part, or together with something else.
+    pub fn is_part(&self, other: &Self) -> bool {
         let smaller = (self.width * self.height).min(other.width * other.height);
-        if smaller > 0.0 { self.both(other) / smaller } else { 0.0 }
+        self.both(other) >= PART * smaller && self.iou(other) < SAME
     }
 
     /// Pixels in both.
@@ -56,6 +57,10 @@ impl Box2 {
     }
 }
 
+/// Share of the smaller box inside the other one from which it is a part, and the
+/// overlap (IoU) from which both are one outline.
+const PART: f32 = 0.7;
+const SAME: f32 = 0.5;
 /// Standard deviation of the centroid of one and the same object from frame to
 /// frame, in parts of its extent: a region never covers exactly the same pixels.
 const SEGMENTATION: f64 = 0.25;
@@ -130,12 +135,14 @@ impl Follow {
     /// it was seen in `confirm` of the last three frames.
     pub fn observe(&mut self, stamp: Stamp, region: &Region, confirm: u32) {
         let elapsed = stamp.seconds_since(self.last_seen) as f32;
-        if elapsed > 0.0 {
+        let seen = Box2::of(region);
+        // Where the centre of a part is says nothing about motion.
+        if elapsed > 0.0 && !self.bounds.is_part(&seen) {
             // The error of the predicted centre came about since the last
             // sighting; half of it is taken for the box's own jitter, except
             // when there is no estimate yet.
             let gain = if self.sightings == 1 { 1.0 } else { 0.5 } / elapsed;
-            let (seen, predicted) = (Box2::of(region).centre(), self.bounds.centre());
+            let (seen, predicted) = (seen.centre(), self.bounds.centre());
             self.drift[0] += gain * (seen[0] - predicted[0]);
             self.drift[1] += gain * (seen[1] - predicted[1]);
         }
@@ -143,7 +150,7 @@ impl Follow {
         self.history |= 1;
         self.sightings += 1;
         self.last_seen = stamp;
-        self.bounds = Box2::of(region);
+        self.bounds = seen;
         match &mut self.kalman {
             Some(kalman) => kalman.update(&region.position, &noise(region)),
             None => self.kalman = Kalman::new(&region.position, &noise(region)),
