@@ -18,7 +18,6 @@ use crate::perception::{Region, RegionList, Rejections, RoiMask};
 use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::ground::Plane;
-use crate::stage::per_thread::PerThread;
 use components::{Candidates, Components};
 use contour::Contour;
 use measure::{Evidence, Measure};
@@ -84,7 +83,9 @@ pub struct Regions {
     /// Ids of the candidates that are large enough, and what speaks for each.
     ids: Vec<u32>,
     evidence: Vec<Evidence>,
-    workers: PerThread<Worker>,
+    /// One for each thread. Which of them gets which regions does not depend on
+    /// who is faster, so that their buffers stop growing.
+    workers: Vec<Worker>,
 }
 
 /// Measures and outlines one region after the other.
@@ -109,7 +110,7 @@ impl Regions {
             candidates: Candidates::default(),
             ids: Vec::new(),
             evidence: Vec::new(),
-            workers: PerThread::new(),
+            workers: Vec::new(),
         }
     }
 
@@ -156,17 +157,23 @@ impl Regions {
 
     /// Fills one region for each of `self.ids`, and what speaks for it.
     fn measure(&mut self, source: &RegionSource<'_>, regions: &mut [Region]) {
-        let level = self.level;
-        self.workers.fit(|| Worker { measure: Measure::new(level), contour: Contour::default() });
+        while self.workers.len() < rayon::current_num_threads() {
+            self.workers
+                .push(Worker { measure: Measure::new(self.level), contour: Contour::default() });
+        }
         self.evidence.resize(regions.len(), Evidence::default());
         let Self { candidates, ids, evidence, workers, .. } = self;
-        let regions = regions.par_iter_mut().zip(evidence).zip(ids);
-        regions.for_each(|((region, evidence), &mut id)| {
-            let bounds = &candidates.boxes[id as usize - 1];
-            let measure = &mut workers.lock().measure;
-            *evidence = measure.run(id, bounds, &candidates.ids, source, region);
-            region.confidence = confidence(region);
-        });
+        let share = share(regions.len(), workers);
+        let work = regions.par_chunks_mut(share).zip(evidence.par_chunks_mut(share));
+        work.zip(ids.par_chunks(share)).zip(workers).for_each(
+            |(((regions, evidence), ids), worker)| {
+                for ((region, evidence), &id) in regions.iter_mut().zip(evidence).zip(ids) {
+                    let bounds = &candidates.boxes[id as usize - 1];
+                    *evidence = worker.measure.run(id, bounds, &candidates.ids, source, region);
+                    region.confidence = confidence(region);
+                }
+            },
+        );
     }
 
     /// Numbers the regions in their order, in the label image too, and draws their contours.
@@ -184,12 +191,20 @@ impl Regions {
             }
         }
         let Self { workers, contour_tolerance, .. } = self;
-        regions.par_iter_mut().for_each(|region| {
-            let (width, origin) = (region.width as usize, [region.x, region.y]);
-            let contour = &mut workers.lock().contour;
-            contour.run(&region.mask, width, origin, *contour_tolerance, &mut region.contour);
+        let share = share(regions.len(), workers);
+        regions.par_chunks_mut(share).zip(workers).for_each(|(regions, worker)| {
+            for region in regions {
+                let (width, origin) = (region.width as usize, [region.x, region.y]);
+                let (mask, tolerance) = (&region.mask, *contour_tolerance);
+                worker.contour.run(mask, width, origin, tolerance, &mut region.contour);
+            }
         });
     }
+}
+
+/// How many of `regions` each of the workers gets, at most.
+fn share(regions: usize, workers: &[Worker]) -> usize {
+    regions.div_ceil(workers.len().max(1)).max(1)
 }
 
 /// Probability that a region is a thing of this outline (mask IoU of at least
