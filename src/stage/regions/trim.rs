@@ -16,7 +16,8 @@ pub const NARROW_M: f32 = 1.2;
 /// Most pixels that are cut from one end of a row, and most parts of the row.
 const MOST_PX: usize = 6;
 const MOST_PART: usize = 3;
-/// Rows above and below over which an edge is added up: sides are upright.
+/// Rows above and below over which an edge is added up, every other one: sides
+/// are upright.
 const BAND: usize = 3;
 /// What an edge loses per pixel further inward.
 const INWARD: f32 = 0.95;
@@ -39,7 +40,7 @@ pub struct Trim<'a> {
 impl Trim<'_> {
     /// Moves both ends of every row of candidate `id` inward to the strongest
     /// upright edge (maximum over R, G and B of |I(x + 1) − I(x − 1)|, added up
-    /// over seven rows) within six pixels and a third of the row. An end at
+    /// over four of seven rows) within six pixels and a third of the row. An end at
     /// something nearer stays: there it is the other thing that grew.
     pub fn run(&self, id: u32, out: &mut Candidates) {
         let bounds = out.boxes[id as usize - 1];
@@ -92,6 +93,7 @@ impl Trim<'_> {
             let (before, after) = (x.saturating_sub(1), (x + 1).min(self.rgb.width() - 1));
             let edge: u32 = rows
                 .clone()
+                .step_by(2)
                 .map(|y| {
                     let row = self.rgb.row(y);
                     let steps = row[before].iter().zip(row[after]).map(|(a, b)| a.abs_diff(b));

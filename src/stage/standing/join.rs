@@ -12,6 +12,8 @@ use crate::stage::regions::union_find::UnionFind;
 const GAP_M: f32 = 0.4;
 /// Share of a segment's height over which a gap beside it shows what is behind.
 const SEE_THROUGH: f32 = 0.5;
+/// Columns joined after which no further ones are asked: those have been.
+const ENOUGH: usize = 2;
 /// Their difference in depth: metres, in parts of the depth, and in standard
 /// deviations of a segment's disparity, pixels.
 const STEP_M: f32 = 0.5;
@@ -66,6 +68,7 @@ impl Join {
         for (i, place) in self.places.iter().enumerate().filter(|(i, _)| self.strong[*i]) {
             let column = place.x as usize;
             let reach = view.columns(GAP_M, place);
+            let mut looked = 0;
             for x in (column.saturating_sub(reach)..column).rev() {
                 let others = first[x] as usize..first[x + 1] as usize;
                 let mut joined = false;
@@ -75,7 +78,8 @@ impl Join {
                         joined = true;
                     }
                 }
-                if !joined && seen_through(disparity, x, &segments[i]) {
+                looked += usize::from(joined);
+                if looked == ENOUGH || (!joined && seen_through(disparity, x, &segments[i])) {
                     break;
                 }
             }
