@@ -5,7 +5,9 @@ pub mod calibration;
 pub mod cdr;
 pub mod convert;
 pub mod diagnostics;
+pub mod endpoint;
 pub mod environment;
+pub mod graph;
 pub mod log;
 pub mod message;
 pub mod names;
@@ -19,6 +21,8 @@ pub mod security;
 pub mod services;
 pub mod time;
 pub mod yaml;
+#[cfg(feature = "zenoh")]
+pub mod zenoh;
 
 /// Name of the node before remapping.
 pub const NODE_NAME: &str = "salient_stereo";

@@ -85,7 +85,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome, CommandError> {
     };
     let mut node = NodeRuntime::start(options).map_err(CommandError::failed)?;
     let mut camera =
-        RosNode::open(names("demo_camera")?, &environment, false).map_err(CommandError::failed)?;
+        RosNode::open(names("demo_camera")?, &environment).map_err(CommandError::failed)?;
     let listener =
         RegionsListener::new(&mut camera, node.regions_topic()).map_err(CommandError::failed)?;
     let player = StereoPlayer::with_infos(&mut camera, recording.compressed, recording.infos)

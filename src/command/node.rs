@@ -29,7 +29,8 @@ Usage: salient_stereo_node [--ros-args ARGUMENTS… [--]]
       --enable-rosout-logs, --disable-rosout-logs, --enable-stdout-logs, --disable-stdout-logs
 
 Environment: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY, RMW_IMPLEMENTATION,
-ROS_SECURITY_ENABLE, ROS_SECURITY_STRATEGY, ROS_SECURITY_KEYSTORE, ROS_SECURITY_ENCLAVE_OVERRIDE";
+ROS_SECURITY_ENABLE, ROS_SECURITY_STRATEGY, ROS_SECURITY_KEYSTORE, ROS_SECURITY_ENCLAVE_OVERRIDE,
+ZENOH_SESSION_CONFIG_URI, ZENOH_CONFIG_OVERRIDE";
 
 /// The command line behind `node`.
 #[derive(Clone, Debug, Default, clap::Args)]

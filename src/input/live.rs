@@ -9,7 +9,7 @@ use std::time::Instant;
 use futures::channel::oneshot;
 use futures::future::{Either, select};
 use futures::stream::{BoxStream, SelectAll, StreamExt};
-use ros2_client::{ReadResult, Subscription};
+use ros2_client::ReadResult;
 use thiserror::Error;
 
 pub use frame::{FrameBuilder, FrameError};
@@ -18,6 +18,7 @@ use crate::config::{Config, ImageTransport, Input};
 use crate::mailbox::Mailbox;
 use crate::ros::calibration::{CalibrationFileError, camera_info_from_url};
 use crate::ros::diagnostics::{InputState, NodeStatus};
+use crate::ros::endpoint::Subscription;
 use crate::ros::message::Message;
 use crate::ros::message::sensor_msgs::{CameraInfo, CompressedImage, Image};
 use crate::ros::names::NameError;

@@ -3,7 +3,7 @@
 
 use std::net::{IpAddr, Ipv4Addr};
 
-use ros2_client::ServiceMapping;
+use ros2_client::dds::ServiceMapping;
 use thiserror::Error;
 
 use crate::ros::security::{Demand, Enclave, SecurityError};
@@ -26,15 +26,35 @@ pub enum EnvironmentError {
     Security(#[from] SecurityError),
 }
 
+/// What carries the messages.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Middleware {
+    /// DDS, and how services travel on it.
+    Dds(ServiceMapping),
+    /// Zenoh, as `rmw_zenoh_cpp` speaks it.
+    #[cfg(feature = "zenoh")]
+    Zenoh(ZenohSettings),
+}
+
+/// How a Zenoh session finds the others.
+#[cfg(feature = "zenoh")]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ZenohSettings {
+    /// `ZENOH_SESSION_CONFIG_URI`: a JSON5 file in place of ROS's default.
+    pub config_file: Option<std::path::PathBuf>,
+    /// `ZENOH_CONFIG_OVERRIDE`: `KEY=VALUE;KEY=VALUE`, the values in JSON5.
+    pub overrides: String,
+}
+
 /// Where to look for other nodes, and how to speak to them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Environment {
-    /// DDS domain, 0..=232.
+    /// Domain, 0..=232.
     pub domain_id: u16,
-    /// True: traffic on the loopback interface only.
+    /// True: DDS traffic on the loopback interface only.
     pub localhost: bool,
-    /// How services travel.
-    pub service_mapping: ServiceMapping,
+    /// What carries the messages.
+    pub middleware: Middleware,
     /// Where identity and permissions come from; `None`: traffic is not secured.
     pub security: Option<Enclave>,
     /// What was asked for and cannot be had, for the log.
@@ -56,7 +76,7 @@ impl Environment {
         Self {
             domain_id,
             localhost: true,
-            service_mapping: ServiceMapping::Enhanced,
+            middleware: Middleware::Dds(ServiceMapping::Enhanced),
             security: None,
             notes: Vec::new(),
         }
@@ -124,27 +144,59 @@ impl Environment {
                 "ROS_STATIC_PEERS={peers} is not honoured: other hosts are found by multicast only"
             ));
         }
-        let security = match demand(&variable, enclave)? {
-            Some(demand) => demand.meet(&mut notes)?,
-            None => None,
-        };
-        let service_mapping = match variable("RMW_IMPLEMENTATION").as_deref() {
-            Some("rmw_cyclonedds_cpp") => ServiceMapping::Cyclone,
+        let demand = demand(&variable, enclave)?;
+        let middleware = match variable("RMW_IMPLEMENTATION").as_deref() {
+            Some("rmw_cyclonedds_cpp") => Middleware::Dds(ServiceMapping::Cyclone),
+            Some("rmw_zenoh_cpp") => zenoh(&variable)?,
             Some(other) if other != "rmw_fastrtps_cpp" && other != "rmw_fastrtps_dynamic_cpp" => {
                 notes.push(format!(
                     "RMW_IMPLEMENTATION={other}: this node speaks DDS as rmw_fastrtps_cpp does"
                 ));
-                ServiceMapping::Enhanced
+                Middleware::Dds(ServiceMapping::Enhanced)
             }
-            _ => ServiceMapping::Enhanced,
+            _ => Middleware::Dds(ServiceMapping::Enhanced),
         };
-        Ok(Self { domain_id, localhost, service_mapping, security, notes })
+        #[cfg(feature = "zenoh")]
+        if let (Middleware::Zenoh(_), Some(demand)) = (&middleware, &demand) {
+            if demand.enforce {
+                return Err(SecurityError::Zenoh.into());
+            }
+            notes.push(SecurityError::Zenoh.to_string());
+        }
+        let security = match (&middleware, demand) {
+            (Middleware::Dds(_), Some(demand)) => demand.meet(&mut notes)?,
+            _ => None,
+        };
+        Ok(Self { domain_id, localhost, middleware, security, notes })
     }
 
     /// The only networks to use; `None` for all.
     pub(crate) fn only_networks(&self) -> Option<[IpAddr; 1]> {
         self.localhost.then_some([IpAddr::V4(Ipv4Addr::LOCALHOST)])
     }
+}
+
+/// What is asked for as to Zenoh.
+#[cfg(feature = "zenoh")]
+// As its twin below, which can fail.
+#[allow(clippy::unnecessary_wraps)]
+fn zenoh(
+    variable: &impl Fn(&'static str) -> Option<String>,
+) -> Result<Middleware, EnvironmentError> {
+    Ok(Middleware::Zenoh(ZenohSettings {
+        config_file: variable("ZENOH_SESSION_CONFIG_URI").map(Into::into),
+        overrides: variable("ZENOH_CONFIG_OVERRIDE").unwrap_or_default(),
+    }))
+}
+
+#[cfg(not(feature = "zenoh"))]
+fn zenoh(_: &impl Fn(&'static str) -> Option<String>) -> Result<Middleware, EnvironmentError> {
+    Err(EnvironmentError::Value {
+        name: "RMW_IMPLEMENTATION",
+        value: "rmw_zenoh_cpp".to_owned(),
+        wanted: "this build speaks DDS only; build with `cargo build --release --features zenoh`, \
+                 or name rmw_fastrtps_cpp or rmw_cyclonedds_cpp",
+    })
 }
 
 /// What is asked for as to security; `None` when it is off.
@@ -183,7 +235,7 @@ mod tests {
     use super::*;
 
     fn environment(
-        variables: &'static [(&'static str, &'static str)],
+        variables: &[(&'static str, &'static str)],
     ) -> Result<Environment, EnvironmentError> {
         let look_up = |name: &str| {
             variables.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
@@ -195,7 +247,7 @@ mod tests {
     fn nothing_set_is_the_default_of_ros() {
         let env = environment(&[]).unwrap();
         assert_eq!((env.domain_id, env.localhost), (0, false));
-        assert_eq!(env.service_mapping, ServiceMapping::Enhanced);
+        assert_eq!(env.middleware, Middleware::Dds(ServiceMapping::Enhanced));
         assert!(env.notes.is_empty());
     }
 
@@ -208,7 +260,7 @@ mod tests {
         ])
         .unwrap();
         assert_eq!((env.domain_id, env.localhost), (42, true));
-        assert_eq!(env.service_mapping, ServiceMapping::Cyclone);
+        assert_eq!(env.middleware, Middleware::Dds(ServiceMapping::Cyclone));
         assert!(environment(&[("ROS_LOCALHOST_ONLY", "1")]).unwrap().localhost);
     }
 
@@ -217,7 +269,7 @@ mod tests {
         let env = environment(&[
             ("ROS_STATIC_PEERS", "10.0.0.1"),
             ("ROS_SECURITY_ENABLE", "true"),
-            ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"),
+            ("RMW_IMPLEMENTATION", "rmw_connextdds"),
         ])
         .unwrap();
         assert_eq!(env.notes.len(), 3);
@@ -255,5 +307,32 @@ mod tests {
             ("ROS_SECURITY_KEYSTORE", "/no/such/keystore"),
         ]);
         assert_eq!(off.unwrap().security, None);
+    }
+
+    #[cfg(not(feature = "zenoh"))]
+    #[test]
+    fn a_build_without_zenoh_says_so() {
+        let error = environment(&[("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")]).unwrap_err();
+        assert!(error.to_string().contains("--features zenoh"), "{error}");
+    }
+
+    #[cfg(feature = "zenoh")]
+    #[test]
+    fn zenoh_is_chosen_with_its_settings_and_never_taken_for_secured() {
+        let chosen = [
+            ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"),
+            ("ZENOH_SESSION_CONFIG_URI", "/etc/session.json5"),
+            ("ZENOH_CONFIG_OVERRIDE", "mode=\"client\""),
+            ("ROS_SECURITY_ENABLE", "true"),
+        ];
+        let Middleware::Zenoh(settings) = environment(&chosen[..3]).unwrap().middleware else {
+            panic!("not Zenoh")
+        };
+        assert_eq!(settings.config_file.unwrap().to_str(), Some("/etc/session.json5"));
+        assert_eq!(settings.overrides, "mode=\"client\"");
+        let noted = environment(&chosen).unwrap();
+        assert!(noted.security.is_none() && noted.notes[0].contains("Zenoh"));
+        let enforced = [chosen[0], chosen[3], ("ROS_SECURITY_STRATEGY", "Enforce")];
+        assert_eq!(environment(&enforced), Err(SecurityError::Zenoh.into()));
     }
 }

@@ -9,8 +9,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::{Duration, Instant};
 
-use ros2_client::log::LogLevel;
-use ros2_client::{NodeLoggingHandle, RosoutRaw};
 use tracing::field::{Field, Visit};
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::EnvFilter;
@@ -19,6 +17,8 @@ use tracing_subscriber::layer::{Context, Layer, SubscriberExt as _};
 use tracing_subscriber::util::SubscriberInitExt as _;
 
 use crate::ros::args::{LogArgs, Severity};
+use crate::ros::endpoint::Publisher;
+use crate::ros::message::rcl_interfaces::Log;
 use crate::ros::time::NodeClock;
 
 /// Lines of the transport libraries that are shown per window.
@@ -41,14 +41,10 @@ pub fn init(args: &LogArgs, logger: &str) {
         stderr: args.stdout,
         foreign: Mutex::new(Thinning::default()),
     };
-    // The handle of `/rosout` logs what it sends once more: that is left out.
     let result = if std::env::var_os(EnvFilter::DEFAULT_ENV).is_some() {
         tracing_subscriber::registry().with(EnvFilter::from_default_env()).with(layer).try_init()
     } else {
-        let targets = Targets::new()
-            .with_default(LevelFilter::ERROR)
-            .with_target("ros2_client::rosout", LevelFilter::OFF)
-            .with_target(OWN_TARGET, own);
+        let targets = Targets::new().with_default(LevelFilter::ERROR).with_target(OWN_TARGET, own);
         tracing_subscriber::registry().with(targets).with(layer).try_init()
     };
     // Another subscriber is in place, as in tests: it decides.
@@ -60,21 +56,20 @@ const OWN_TARGET: &str = env!("CARGO_CRATE_NAME");
 static ROSOUT: RwLock<Option<Rosout>> = RwLock::new(None);
 
 struct Rosout {
-    handle: NodeLoggingHandle,
+    publisher: Publisher<Log>,
     logger: String,
     clock: Arc<NodeClock>,
 }
 
 /// Sends this crate's events to `/rosout` from now on.
-pub(crate) fn connect_rosout(handle: NodeLoggingHandle, logger: String, clock: Arc<NodeClock>) {
+pub(crate) fn connect_rosout(publisher: Publisher<Log>, logger: String, clock: Arc<NodeClock>) {
     *ROSOUT.write().unwrap_or_else(PoisonError::into_inner) =
-        Some(Rosout { handle, logger, clock });
+        Some(Rosout { publisher, logger, clock });
 }
 
 /// Ends what [`connect_rosout`] began.
 pub(crate) fn disconnect_rosout() {
-    // Dropped outside the lock: the handle may hold the last reference to a
-    // writer, whose end logs.
+    // Dropped outside the lock: the end of a publisher logs.
     let old = ROSOUT.write().unwrap_or_else(PoisonError::into_inner).take();
     drop(old);
 }
@@ -106,16 +101,16 @@ impl<S: Subscriber> Layer<S> for RosLayer {
             if let Ok(rosout) = ROSOUT.try_read()
                 && let Some(rosout) = &*rosout
             {
-                let now = rosout.clock.now();
-                rosout.handle.rosout_raw(
-                    ros2_client::builtin_interfaces::Time::from_nanos(now.0),
-                    rosout_level(level),
-                    &rosout.logger,
-                    &line.text,
-                    metadata.file().unwrap_or_default(),
-                    metadata.module_path().unwrap_or_default(),
-                    metadata.line().unwrap_or_default(),
-                );
+                // A full window or a closed transport: the line stands on stderr.
+                let _ = rosout.publisher.publish(Log {
+                    stamp: rosout.clock.now().into(),
+                    level: rosout_level(level),
+                    name: rosout.logger.clone(),
+                    msg: line.text.clone(),
+                    file: metadata.file().unwrap_or_default().to_owned(),
+                    function: metadata.module_path().unwrap_or_default().to_owned(),
+                    line: metadata.line().unwrap_or_default(),
+                });
             }
             if self.stderr {
                 write_line(level, &self.logger, &line.text);
@@ -134,12 +129,13 @@ impl<S: Subscriber> Layer<S> for RosLayer {
     }
 }
 
-fn rosout_level(level: Level) -> LogLevel {
+/// As in `rcl_interfaces/msg/Log`.
+fn rosout_level(level: Level) -> u8 {
     match level {
-        Level::ERROR => LogLevel::Error,
-        Level::WARN => LogLevel::Warn,
-        Level::INFO => LogLevel::Info,
-        Level::DEBUG | Level::TRACE => LogLevel::Debug,
+        Level::ERROR => 40,
+        Level::WARN => 30,
+        Level::INFO => 20,
+        Level::DEBUG | Level::TRACE => 10,
     }
 }
 

@@ -5,9 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ros2_client::{Publisher, Subscription, WriteError};
+use ros2_client::WriteError;
 use thiserror::Error;
 
+use crate::ros::endpoint::{Publisher, Subscription};
 use crate::ros::message::Message;
 use crate::ros::message::salient_stereo_msgs::SalientRegionArray;
 use crate::ros::message::sensor_msgs::{CameraInfo, CompressedImage, Image};

@@ -6,7 +6,7 @@ mod overrides;
 
 pub use overrides::{PREFIX, QosOverrides, Role};
 
-use rustdds::policy::{Durability, History, ResourceLimits};
+use rustdds::policy::{Durability, History, Lifespan, ResourceLimits};
 use rustdds::{Duration, QosPolicies, QosPolicyBuilder};
 
 /// Samples kept per topic: ROS 2's keep-last depth of the interface.
@@ -54,4 +54,14 @@ pub const fn clock() -> QosPolicies {
 /// `/parameter_events`: reliable, volatile.
 pub const fn parameter_events() -> QosPolicies {
     keep_last(100).reliable(Duration::ZERO).build()
+}
+
+/// `/rosout`: reliable, the last thousand lines of ten seconds for whoever
+/// comes late.
+pub const fn rosout() -> QosPolicies {
+    keep_last(1000)
+        .durability(Durability::TransientLocal)
+        .lifespan(Lifespan { duration: Duration::from_secs(10) })
+        .reliable(Duration::ZERO)
+        .build()
 }

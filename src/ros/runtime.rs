@@ -29,12 +29,12 @@ use crate::mailbox::Mailbox;
 use crate::output::live::LiveOutput;
 use crate::perception::Perception;
 use crate::ros::diagnostics::NodeStatus;
-use crate::ros::environment::Environment;
+use crate::ros::environment::{Environment, Middleware};
 use crate::ros::log;
 use crate::ros::names::Names;
 use crate::ros::node::{Graph, NodeError, RosNode, receive_buffer_advice};
 use crate::ros::params::ParameterStore;
-use crate::ros::qos::QosOverrides;
+use crate::ros::qos::{self, QosOverrides};
 use crate::ros::services::{Services, Targets};
 use crate::ros::time::NodeClock;
 use crate::stamp::Stamp;
@@ -134,12 +134,13 @@ impl NodeRuntime {
             tracing::warn!("{note}");
         }
         log::mute_transport(false);
-        let mut node = RosNode::open(names.clone(), &environment, rosout)?;
+        let mut node = RosNode::open(names.clone(), &environment)?;
         node.override_qos(qos_overrides);
         let clock = Arc::new(NodeClock::default());
         clock.simulate(config.use_sim_time);
         if rosout {
-            log::connect_rosout(node.logging_handle(), names.logger(), Arc::clone(&clock));
+            let publisher = node.advertise("/rosout", &qos::rosout())?;
+            log::connect_rosout(publisher, names.logger(), Arc::clone(&clock));
         }
         if let Some(advice) = node.receive_buffer_bytes().and_then(receive_buffer_advice) {
             tracing::warn!("{advice}");
@@ -167,7 +168,12 @@ impl NodeRuntime {
             "{} on domain {}{}{}: waiting for {}; regions on {regions_topic}, other topics only while subscribed to (lazy)",
             names.full_name(),
             environment.domain_id,
-            if environment.localhost { ", this machine only" } else { "" },
+            match environment.middleware {
+                Middleware::Dds(_) if environment.localhost => ", this machine only",
+                Middleware::Dds(_) => "",
+                #[cfg(feature = "zenoh")]
+                Middleware::Zenoh(_) => ", over Zenoh",
+            },
             if environment.security.is_some() { ", secured" } else { "" },
             topics.iter().map(|topic| topic.name.as_str()).collect::<Vec<_>>().join(", "),
         );

@@ -39,6 +39,12 @@ pub enum SecurityError {
          build with `cargo build --release --features security`, or unset ROS_SECURITY_ENABLE"
     )]
     NotBuilt,
+    /// The traffic is not DDS.
+    #[error(
+        "DDS security is asked for (ROS_SECURITY_ENABLE=true), and Zenoh traffic is not secured by it: \
+         unset ROS_SECURITY_ENABLE, or choose a DDS with RMW_IMPLEMENTATION"
+    )]
+    Zenoh,
     /// No keystore is named.
     #[error(
         "DDS security is asked for (ROS_SECURITY_ENABLE=true), but ROS_SECURITY_KEYSTORE is not set: \

@@ -11,10 +11,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use futures::channel::oneshot;
 use futures::future::{Either, select};
 use futures::stream::{BoxStream, SelectAll, StreamExt};
-use ros2_client::request_id::RmwRequestId;
-use ros2_client::service::Server;
-use ros2_client::{Publisher, ReadResult, Subscription};
+use ros2_client::{ReadResult, RmwRequestId};
 
+use crate::ros::endpoint::{Publisher, Server, Subscription};
 use crate::ros::message::Message;
 use crate::ros::message::rcl_interfaces::{
     DescribeParametersRequest, DescribeParametersResponse, GetParameterTypesRequest,
@@ -274,8 +273,8 @@ fn respond<Req, Resp>(
     request: ReadResult<(RmwRequestId, Req)>,
     answer: impl FnOnce(&Req) -> Resp,
 ) where
-    Req: Message + 'static,
-    Resp: Message + 'static,
+    Req: Message + Send + Sync + 'static,
+    Resp: Message + Send + Sync + 'static,
 {
     match request {
         Ok((id, request)) => {

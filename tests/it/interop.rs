@@ -9,6 +9,8 @@
 //! `SALIENT_STEREO_PYTHON` names another interpreter than `python3`.
 
 mod referee;
+#[cfg(feature = "zenoh")]
+mod zenoh;
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -117,7 +119,7 @@ fn a_cyclone_peer_gets_one_region_array_per_pair() {
 /// whatever the node does.
 fn large_images(script: &Path, domain: u16) {
     let names = Names::new("/", "probe", &[]).unwrap();
-    let probe = RosNode::open(names, &Environment::localhost(domain), false).unwrap();
+    let probe = RosNode::open(names, &Environment::localhost(domain)).unwrap();
     if let Some(advice) = probe.receive_buffer_bytes().and_then(receive_buffer_advice) {
         println!("skipped: {advice}");
         return;

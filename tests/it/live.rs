@@ -8,13 +8,15 @@ mod lazy;
 mod process;
 #[cfg(feature = "security")]
 mod security;
+#[cfg(feature = "zenoh")]
+mod zenoh;
 
 use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use ros2_client::service::Client;
 use salient_stereo::config::Config;
+use salient_stereo::ros::endpoint::Client;
 use salient_stereo::ros::environment::Environment;
 use salient_stereo::ros::message::Message;
 use salient_stereo::ros::message::diagnostic_msgs::DiagnosticArray;
@@ -122,7 +124,7 @@ fn every_pair_comes_back_as_one_region_array() {
     const PAIRS: u32 = 12;
     let environment = environment(0);
     let mut runtime = start(small(), &environment);
-    let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("peer"), &environment).unwrap();
     let mut player = StereoPlayer::new(&mut peer, false).unwrap();
     let mut listener = RegionsListener::new(&mut peer, runtime.regions_topic()).unwrap();
     let disparity = peer.subscribe::<DisparityImage>("/robot/disparity", &qos::output()).unwrap();
@@ -191,7 +193,7 @@ fn parameters_are_listed_described_set_and_refused() {
     let mut config = small();
     config.use_sim_time = true;
     let mut runtime = start(config, &environment);
-    let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("peer"), &environment).unwrap();
     let service = |name: &str| format!("/robot/eye/{name}");
 
     let list: Client<ListParametersRequest, ListParametersResponse> =

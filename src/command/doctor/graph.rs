@@ -48,7 +48,7 @@ pub fn examine_graph(
         patient.remaps.iter().filter(|rule| rule.kind != RemapKind::Node).cloned().collect();
     let names = Names::new(patient.names.namespace(), NAME, &rules)
         .map_err(crate::input::live::LiveInputError::Name)?;
-    let mut node = RosNode::open(names, environment, false)?;
+    let mut node = RosNode::open(names, environment)?;
     let input = LiveInput::subscribe(&mut node, patient.config)?;
     let topics = input.topics().to_vec();
     let graph = node.graph();

@@ -1,9 +1,10 @@
 //! One published topic, and whether anybody listens.
 
-use ros2_client::{Publisher, WriteError};
+use ros2_client::WriteError;
 use rustdds::QosPolicies;
 
 use crate::ros::diagnostics::NodeStatus;
+use crate::ros::endpoint::Publisher;
 use crate::ros::message::Message;
 use crate::ros::names::NameError;
 use crate::ros::node::{NodeError, RosNode};

@@ -36,10 +36,10 @@ fn examine(environment: &Environment, seconds: f64) -> Vec<Finding> {
 #[test]
 fn a_camera_that_works_is_found_well_and_a_conflict_beside_it_is_named() {
     let environment = environment(5);
-    let mut peer = RosNode::open(names("camera"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("camera"), &environment).unwrap();
     let mut player = StereoPlayer::new(&mut peer, false).unwrap();
     let offered = peer.advertise::<SalientRegionArray>("/robot/regions", &qos::output()).unwrap();
-    let mut other = RosNode::open(names("viewer"), &environment, false).unwrap();
+    let mut other = RosNode::open(names("viewer"), &environment).unwrap();
     let request = QosPolicyBuilder::new()
         .reliability(Reliability::Reliable { max_blocking_time: rustdds::Duration::ZERO })
         .durability(Durability::TransientLocal)
@@ -79,7 +79,7 @@ fn a_camera_that_works_is_found_well_and_a_conflict_beside_it_is_named() {
 #[test]
 fn topics_that_nobody_publishes_or_with_another_type_are_named() {
     let environment = environment(6);
-    let mut peer = RosNode::open(names("camera"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("camera"), &environment).unwrap();
     let elsewhere = peer.advertise::<Image>("/camera/left/image", &qos::output()).unwrap();
     let wrong =
         peer.advertise::<CompressedImage>("/robot/right/image_rect", &qos::output()).unwrap();

@@ -25,7 +25,7 @@ fn bad_messages_are_counted_by_reason_and_the_node_goes_on() {
     let mut options = NodeOptions::new(small(), names("eye"), environment.clone());
     options.rosout = true;
     let mut runtime = NodeRuntime::start(options).unwrap();
-    let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("peer"), &environment).unwrap();
     let mut player = StereoPlayer::new(&mut peer, false).unwrap();
     let mut listener = RegionsListener::new(&mut peer, runtime.regions_topic()).unwrap();
     let rosout = peer.subscribe::<Log>("/rosout", &qos::reliable_input()).unwrap();
@@ -61,7 +61,7 @@ fn bad_messages_are_counted_by_reason_and_the_node_goes_on() {
     assert!(listener.next(PATIENCE).is_some(), "the node did not survive a jump back in time");
 
     // Another participant publishes another type on an input topic.
-    let mut stranger = RosNode::open(names("stranger"), &environment, false).unwrap();
+    let mut stranger = RosNode::open(names("stranger"), &environment).unwrap();
     let wrong =
         stranger.advertise::<CompressedImage>("/robot/right/image_rect", &qos::output()).unwrap();
     wait("the wrong type to be named", || {

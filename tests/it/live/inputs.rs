@@ -44,7 +44,7 @@ fn raw(messages: &StereoMessages) -> (&Image, &Image) {
 fn compressed_images_are_read_beside_their_raw_names() {
     let environment = environment(8);
     let mut runtime = start(with("image_transport", "compressed"), &environment);
-    let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("peer"), &environment).unwrap();
     let mut player = StereoPlayer::new(&mut peer, true).unwrap();
     let mut listener = RegionsListener::new(&mut peer, runtime.regions_topic()).unwrap();
     assert!(player.wait_for_subscribers(PATIENCE, &AtomicBool::new(false)));
@@ -72,7 +72,7 @@ fn answer(
     images: &[Image],
 ) -> SalientRegionArray {
     let mut runtime = start(config, environment);
-    let mut peer = RosNode::open(names("peer"), environment, false).unwrap();
+    let mut peer = RosNode::open(names("peer"), environment).unwrap();
     let full = |topic: &str| format!("/robot/{topic}");
     let cameras: Vec<_> = topics
         .iter()

@@ -3,9 +3,9 @@
 
 use std::sync::atomic::AtomicBool;
 
-use ros2_client::Subscription;
 use salient_stereo::image::Picture;
 use salient_stereo::ros::convert::{compressed_picture, compressed_u16, picture};
+use salient_stereo::ros::endpoint::Subscription;
 use salient_stereo::ros::message::Message;
 use salient_stereo::ros::message::sensor_msgs::{CameraInfo, CompressedImage, Image, PointCloud2};
 use salient_stereo::ros::message::vision_msgs::{Detection2DArray, Detection3DArray};
@@ -54,7 +54,7 @@ fn newest<M: Message + 'static>(subscription: &Subscription<M>) -> M {
 fn every_lazy_topic_comes_to_whoever_subscribes() {
     let environment = environment(3);
     let mut runtime = start(small(), &environment);
-    let mut peer = RosNode::open(names("peer"), &environment, false).unwrap();
+    let mut peer = RosNode::open(names("peer"), &environment).unwrap();
     let mut player = StereoPlayer::new(&mut peer, false).unwrap();
 
     let detections_2d = listen::<Detection2DArray>(&mut peer, "detections_2d");

@@ -54,20 +54,20 @@ fn secured(
 #[test]
 fn only_members_of_the_keystore_are_heard_and_served() {
     const PAIRS: u32 = 5;
-    let open = environment(7);
+    let open = environment(11);
     let keystore = Keystore::new(open.domain_id);
     keystore.add_enclave("/robot/eye");
     keystore.add_enclave("/robot/camera");
     let mut runtime = start(small(), &secured(&open, &keystore, "/robot/eye").unwrap());
 
     // The outsider is there first and asks for everything.
-    let mut outsider = RosNode::open(names("outsider"), &open, false).unwrap();
+    let mut outsider = RosNode::open(names("outsider"), &open).unwrap();
     let overheard =
         outsider.subscribe::<SalientRegionArray>(REGIONS, &qos::reliable_input()).unwrap();
     let mut intruder = StereoPlayer::new(&mut outsider, false).unwrap();
 
     let camera = secured(&open, &keystore, "/robot/camera").unwrap();
-    let mut camera = RosNode::open(names("camera"), &camera, false).unwrap();
+    let mut camera = RosNode::open(names("camera"), &camera).unwrap();
     let mut player = StereoPlayer::new(&mut camera, false).unwrap();
     let mut listener = RegionsListener::new(&mut camera, runtime.regions_topic()).unwrap();
     assert!(
@@ -102,12 +102,12 @@ fn only_members_of_the_keystore_are_heard_and_served() {
 
 #[test]
 fn an_identity_without_permissions_does_not_start() {
-    let open = environment(7);
+    let open = environment(11);
     // Valid in another domain only.
     let keystore = Keystore::new(open.domain_id + 1);
     keystore.add_enclave("/robot/eye");
     let environment = secured(&open, &keystore, "/robot/eye").unwrap();
-    let error = RosNode::open(names("eye"), &environment, false).err().unwrap().to_string();
+    let error = RosNode::open(names("eye"), &environment).err().unwrap().to_string();
     assert!(error.contains("security") && error.contains("/robot/eye"), "{error}");
     assert!(secured(&open, &keystore, "/robot/nose").is_err());
 }
