@@ -164,9 +164,10 @@ def main():
             publishers[f"{side}/image_rect"].put(image(stamp, pixels), attachment=attachment)
         sent.append(stamp)
         time.sleep(1 / arguments.rate)
+    topics = ["regions"] + [rule.split("=")[0] for rule in arguments.listen]
     for _ in range(200):
         with lock:
-            if len(received.get("regions", [])) == len(sent):
+            if all(len(received.get(topic, [])) == len(sent) for topic in topics):
                 break
         time.sleep(0.05)
 

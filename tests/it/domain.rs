@@ -10,3 +10,10 @@ pub fn domain(test: u16) -> u16 {
     assert!(test < EACH, "domains for {EACH} tests");
     1 + (std::process::id() % 8) as u16 * EACH + test
 }
+
+/// A TCP port for the `test`-th of the tests that talk over Zenoh, below those
+/// that Linux gives to others.
+#[cfg(feature = "zenoh")]
+pub fn port(test: u16) -> u16 {
+    20_000 + (std::process::id() % 2000) as u16 * 4 + test
+}

@@ -1,6 +1,5 @@
 //! A camera and viewer on Zenoh that was written from `rmw_zenoh`'s design alone.
 
-use std::net::TcpListener;
 use std::process::Stdio;
 
 use salient_stereo::config::Config;
@@ -13,14 +12,14 @@ use salient_stereo::ros::runtime::{NodeOptions, NodeRuntime};
 use salient_stereo::ros::schema;
 use serde_json::json;
 
+use super::super::domain::port;
 use super::{outcome, python, script};
 
 #[test]
 fn a_zenoh_peer_gets_one_region_array_per_pair() {
     const DOMAIN: u16 = 11;
     let Some(script) = script("zenoh_stereo.py") else { return };
-    // Free a moment ago.
-    let port = TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+    let port = port(2);
     let overrides = format!(r#"connect/endpoints=[];listen/endpoints=["tcp/127.0.0.1:{port}"]"#);
     let environment = Environment {
         middleware: Middleware::Zenoh(ZenohSettings { config_file: None, overrides }),

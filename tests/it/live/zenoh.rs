@@ -1,7 +1,6 @@
 //! The node on Zenoh, over TCP on 127.0.0.1: camera and viewer are a second
 //! session of our own. The peer of another make is in `interop`.
 
-use std::net::TcpListener;
 use std::sync::atomic::AtomicBool;
 
 use salient_stereo::ros::endpoint::Client;
@@ -17,12 +16,11 @@ use salient_stereo::ros::node::RosNode;
 use salient_stereo::ros::play::{RegionsListener, StereoPlayer};
 use salient_stereo::ros::qos;
 
+use super::super::domain::port;
 use super::{HEIGHT, PATIENCE, WIDTH, call, names, pair, small, start, wait};
 
 /// Two environments: the first listens, the second connects to it.
-fn linked() -> [Environment; 2] {
-    // Free a moment ago.
-    let port = TcpListener::bind(("127.0.0.1", 0)).unwrap().local_addr().unwrap().port();
+fn linked(port: u16) -> [Environment; 2] {
     let environment = |overrides: String| {
         let settings = ZenohSettings { config_file: None, overrides };
         Environment { middleware: Middleware::Zenoh(settings), ..Environment::localhost(9) }
@@ -36,7 +34,7 @@ fn linked() -> [Environment; 2] {
 #[test]
 fn pairs_come_back_as_regions_and_dense_topics_over_zenoh() {
     const PAIRS: u32 = 6;
-    let [here, there] = linked();
+    let [here, there] = linked(port(0));
     let mut runtime = start(small(), &here);
     let mut peer = RosNode::open(names("peer"), &there).unwrap();
     assert_eq!(peer.receive_buffer_bytes(), None);
@@ -85,7 +83,7 @@ fn pairs_come_back_as_regions_and_dense_topics_over_zenoh() {
 
 #[test]
 fn services_answer_over_zenoh() {
-    let [here, there] = linked();
+    let [here, there] = linked(port(1));
     let mut runtime = start(small(), &here);
     let mut peer = RosNode::open(names("peer"), &there).unwrap();
     let get: Client<GetParametersRequest, GetParametersResponse> =
