@@ -326,7 +326,7 @@ mod tests {
             ("ROS_SECURITY_ENABLE", "true"),
         ];
         let Middleware::Zenoh(settings) = environment(&chosen[..3]).unwrap().middleware else {
-            panic!("not Zenoh")
+            panic!("another middleware was chosen")
         };
         assert_eq!(settings.config_file.unwrap().to_str(), Some("/etc/session.json5"));
         assert_eq!(settings.overrides, "mode=\"client\"");

@@ -1,8 +1,13 @@
 //! The plane that things stand on.
 
+pub(super) mod plane;
+
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
 use crate::stage::coarse::CELL;
+
+pub use plane::Plane;
+use plane::{Draws, Fit, Measured, normal, through};
 
 /// Strips into which the view is cut from left to right.
 const STRIPS: usize = 16;
@@ -45,87 +50,6 @@ const STEPS: usize = 5;
 const MIN_UPRIGHT: f32 = 0.3;
 /// Largest sine of the camera's roll.
 const MAX_ROLL: f32 = 0.35;
-/// Camera heights in metres that a plane may have.
-const HEIGHTS_M: std::ops::RangeInclusive<f32> = 0.05..=20.0;
-
-/// A plane in disparity space: d = a v + b u + c, with u, v in full-size pixels
-/// and d in pixels (`cx_l - cx_r` subtracted).
-///
-/// In space it is n · P = f B with n = (b fx, a fy, a cy + b cx + c), because
-/// d = f B / Z and u = fx X / Z + cx, v = fy Y / Z + cy. The height of a point
-/// above it is therefore `(f B / |n|) (d − d_plane) / d`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
-    /// Change of disparity per row.
-    pub a: f32,
-    /// Change of disparity per column.
-    pub b: f32,
-    /// Disparity at the origin of the image.
-    pub c: f32,
-    /// Height of the camera above the plane, metres.
-    pub camera_height_m: f32,
-    /// Median distance of what was seen of the plane along the optical axis, metres.
-    pub distance_m: f32,
-}
-
-impl Plane {
-    /// The plane with these coefficients; `None` when it is no plane in space, or
-    /// nearer or farther than anything stands on.
-    pub fn new(a: f32, b: f32, c: f32, rig: &StereoRig) -> Option<Self> {
-        let n = normal(a, b, c, rig);
-        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-        let camera_height_m = rig.depth_scale() as f32 / length;
-        HEIGHTS_M.contains(&camera_height_m).then_some(Self {
-            a,
-            b,
-            c,
-            camera_height_m,
-            distance_m: 10.0,
-        })
-    }
-
-    /// Cosine between the plane's normal and the image's vertical: 1 for a floor
-    /// under a level camera.
-    pub fn upright(&self, rig: &StereoRig) -> f32 {
-        normal(self.a, self.b, self.c, rig)[1] * self.camera_height_m / rig.depth_scale() as f32
-    }
-
-    /// Cosine between the plane's normal and the optical axis: 1 for what is seen
-    /// straight from above.
-    pub fn facing(&self, rig: &StereoRig) -> f32 {
-        normal(self.a, self.b, self.c, rig)[2] * self.camera_height_m / rig.depth_scale() as f32
-    }
-
-    /// A plane between this one and `new`.
-    #[must_use]
-    pub fn mixed(&self, new: &Self, share: f32, rig: &StereoRig) -> Self {
-        let blend = |o: f32, n: f32| o + share * (n - o);
-        let mixed =
-            Self::new(blend(self.a, new.a), blend(self.b, new.b), blend(self.c, new.c), rig);
-        let distance_m = blend(self.distance_m, new.distance_m);
-        // Two planes before the camera have one between them, but rounding may say otherwise.
-        mixed.map_or(*new, |plane| Self { distance_m, ..plane })
-    }
-
-    /// Disparity of the plane at pixel (u, v).
-    #[inline]
-    pub fn disparity(&self, u: f32, v: f32) -> f32 {
-        self.a * v + self.b * u + self.c
-    }
-
-    /// Height in metres above the plane of a point at pixel (u, v) with disparity `d` > 0.
-    #[inline]
-    pub fn height(&self, u: f32, v: f32, d: f32) -> f32 {
-        self.camera_height_m * (d - self.disparity(u, v)) / d
-    }
-
-    /// Size of the scene against a road's, 0.03..=1: every length that has to
-    /// do with the things on the plane is given for a plane seen at 10 m and
-    /// multiplied by this.
-    pub fn scale(&self) -> f32 {
-        (self.distance_m / 10.0).clamp(0.03, 1.0)
-    }
-}
 
 /// Whether there is a plane to reckon with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -180,12 +104,10 @@ impl Footing {
     }
 }
 
-/// A measured cell: pixel and disparity.
+/// A measured cell, and the strip of the view that it lies in.
 #[derive(Clone, Copy, Debug)]
 struct Vote {
-    u: f32,
-    v: f32,
-    d: f32,
+    cell: Measured,
     strip: usize,
 }
 
@@ -269,7 +191,7 @@ impl Ground {
             if d > 0.75 {
                 let (x, y) = (i % width, i / width);
                 let (u, v) = cell_centre(x, y);
-                self.votes.push(Vote { u, v, d, strip: x * STRIPS / width });
+                self.votes.push(Vote { cell: Measured { u, v, d }, strip: x * STRIPS / width });
             }
             i += step;
         }
@@ -291,21 +213,19 @@ impl Ground {
             }
         };
         consider(self.plane);
-        // A fixed sequence (Knuth's MMIX generator): same input, same plane.
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut draws = Draws::new();
         let lower = ((n as f32 * LOWER_PART) as usize).max(1);
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            self.votes[n - 1 - ((state >> 33) as usize) % lower]
-        };
+        let mut random = || self.votes[n - 1 - draws.below(lower)].cell;
         let trials = if self.plane.is_some() { TRIALS_NEAR } else { TRIALS };
         for trial in 0..trials {
             let (p, q) = (random(), random());
             // Two cells give a level plane, which is nearly always right and
             // needs fewer lucky draws; three give one with roll.
-            consider(if trial % 2 == 0 { level(p, q, rig) } else { through(p, q, random(), rig) });
+            consider(if trial % 2 == 0 {
+                level(p, q, rig)
+            } else {
+                through([p, q, random()]).and_then(|plane| plane_of(plane, rig))
+            });
         }
         best.1
     }
@@ -315,8 +235,8 @@ impl Ground {
     fn score(&self, plane: &Plane) -> f32 {
         let mut scores = [0.0_f32; STRIPS];
         for vote in self.votes.iter().step_by(SKIP) {
-            let at = plane.disparity(vote.u, vote.v);
-            let difference = vote.d - at;
+            let at = plane.disparity(vote.cell.u, vote.cell.v);
+            let difference = vote.cell.d - at;
             let tolerance = tolerance(at);
             // Far away everything is near the plane: such votes count less.
             let weight = (at / 8.0).clamp(0.0, 1.0);
@@ -334,28 +254,23 @@ impl Ground {
     fn refine(&mut self, start: Plane, rig: &StereoRig) -> Option<(Plane, f32)> {
         let mut plane = start;
         for _ in 0..STEPS {
-            let mut normal = nalgebra::Matrix3::<f64>::zeros();
-            let mut right = nalgebra::Vector3::<f64>::zeros();
-            for vote in &self.votes {
-                let at = plane.disparity(vote.u, vote.v);
-                let ratio = (vote.d - at) / tolerance(at);
+            let mut fit = Fit::default();
+            for Vote { cell, .. } in &self.votes {
+                let at = plane.disparity(cell.u, cell.v);
+                let ratio = (cell.d - at) / tolerance(at);
                 if ratio.abs() < 1.0 && at > 0.5 {
                     // The tolerance grows with disparity: so does the noise.
-                    let weight = f64::from((1.0 - ratio * ratio).powi(2) / tolerance(at));
-                    let row = nalgebra::Vector3::new(f64::from(vote.v), f64::from(vote.u), 1.0);
-                    normal += weight * row * row.transpose();
-                    right += weight * f64::from(vote.d) * row;
+                    fit.add(*cell, (1.0 - ratio * ratio).powi(2) / tolerance(at));
                 }
             }
-            let solution = normal.try_inverse()? * right;
-            plane = plane_of(solution.x as f32, solution.y as f32, solution.z as f32, rig)?;
+            plane = plane_of(fit.solve()?, rig)?;
         }
         let (mut feet, mut on, mut all) = ([0_usize; STRIPS], 0.0_f32, 0.0_f32);
         self.seen.clear();
         // From the bottom of the image upward.
         for vote in self.votes.iter().rev() {
-            let at = plane.disparity(vote.u, vote.v);
-            let agrees = at > LEAST_DISPARITY && (vote.d - at).abs() < tolerance(at);
+            let at = plane.disparity(vote.cell.u, vote.cell.v);
+            let agrees = at > LEAST_DISPARITY && (vote.cell.d - at).abs() < tolerance(at);
             if agrees {
                 self.seen.push(at);
             }
@@ -378,39 +293,21 @@ impl Ground {
     }
 }
 
-/// |n| is f B over the distance of the camera.
-fn normal(a: f32, b: f32, c: f32, rig: &StereoRig) -> [f32; 3] {
-    let (cx, cy) = rig.principal_point();
-    [b * rig.focal_px() as f32, a * rig.focal_y_px() as f32, a * cy as f32 + b * cx as f32 + c]
-}
-
 /// The plane with these coefficients if it may be a ground.
-fn plane_of(a: f32, b: f32, c: f32, rig: &StereoRig) -> Option<Plane> {
+fn plane_of([a, b, c]: [f32; 3], rig: &StereoRig) -> Option<Plane> {
     let n = normal(a, b, c, rig);
     let plane = Plane::new(a, b, c, rig)?;
     (plane.upright(rig) > MIN_UPRIGHT && n[0].abs() < MAX_ROLL * n[1]).then_some(plane)
 }
 
 /// The plane without roll through two votes.
-fn level(p: Vote, q: Vote, rig: &StereoRig) -> Option<Plane> {
+fn level(p: Measured, q: Measured, rig: &StereoRig) -> Option<Plane> {
     let dv = q.v - p.v;
     if dv.abs() < 12.0 {
         return None;
     }
     let a = (q.d - p.d) / dv;
-    plane_of(a, 0.0, p.d - a * p.v, rig)
-}
-
-fn through(p: Vote, q: Vote, r: Vote, rig: &StereoRig) -> Option<Plane> {
-    let (du1, dv1, dd1) = (q.u - p.u, q.v - p.v, q.d - p.d);
-    let (du2, dv2, dd2) = (r.u - p.u, r.v - p.v, r.d - p.d);
-    let area = dv1 * du2 - dv2 * du1;
-    if area.abs() < 400.0 {
-        return None;
-    }
-    let a = (dd1 * du2 - dd2 * du1) / area;
-    let b = (dv1 * dd2 - dv2 * dd1) / area;
-    plane_of(a, b, p.d - a * p.v - b * p.u, rig)
+    plane_of([a, 0.0, p.d - a * p.v], rig)
 }
 
 /// Centre of a cell in full-size pixels.

@@ -2,6 +2,7 @@
 
 use crate::camera::StereoRig;
 use crate::image::Image;
+use crate::stage::ground::plane::{Draws, Fit, Measured, through};
 use crate::stage::ground::{GroundState, Plane, cell_centre};
 
 /// Spread of the coarse disparity about a plane in pixels (one standard
@@ -50,21 +51,14 @@ const LEAST_DISPARITY: f32 = 10.0 * RELIEF_PX;
 /// Least extent of what is seen of it, in parts of the image's width and height.
 const LEAST_EXTENT: f32 = 0.3;
 
-/// A firm cell: pixel and disparity.
-#[derive(Clone, Copy, Debug)]
-struct Vote {
-    u: f32,
-    v: f32,
-    d: f32,
-}
-
 /// The estimator of a plane seen from above, with its memory of the last one.
 #[derive(Debug, Default)]
 pub struct Table {
     plane: Option<Plane>,
     state: GroundState,
     failures: u32,
-    votes: Vec<Vote>,
+    /// The firm cells.
+    votes: Vec<Measured>,
     seen: Vec<f32>,
 }
 
@@ -134,7 +128,7 @@ impl Table {
             // False for NaN.
             if d - offset > 1.0 && neighbours_on_it(checked, x, y, d) >= FIRM {
                 let (u, v) = cell_centre(x, y);
-                self.votes.push(Vote { u, v, d: d - offset });
+                self.votes.push(Measured { u, v, d: d - offset });
             }
         }
         self.votes.len() as f32 > LEAST_FIRM * asked as f32 && self.votes.len() >= 30
@@ -153,16 +147,11 @@ impl Table {
                 }
             }
         };
-        // A fixed sequence (Knuth's MMIX generator): same input, same plane.
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            self.votes[((state >> 33) as usize) % self.votes.len()]
-        };
+        let mut draws = Draws::new();
+        let mut random = || self.votes[draws.below(self.votes.len())];
         for _ in 0..TRIALS {
-            consider(through([random(), random(), random()], rig));
+            let coefficients = through([random(), random(), random()]);
+            consider(coefficients.and_then(|[a, b, c]| Plane::new(a, b, c, rig)));
         }
         best.1
     }
@@ -176,19 +165,15 @@ impl Table {
     ) -> Option<(Plane, f32)> {
         let mut plane = start;
         for _ in 0..STEPS {
-            let mut normal = nalgebra::Matrix3::<f64>::zeros();
-            let mut right = nalgebra::Vector3::<f64>::zeros();
+            let mut fit = Fit::default();
             for vote in &self.votes {
                 let ratio = (vote.d - plane.disparity(vote.u, vote.v)) / TOLERANCE_PX;
                 if ratio.abs() < 1.0 {
-                    let weight = f64::from((1.0 - ratio * ratio).powi(2));
-                    let row = nalgebra::Vector3::new(f64::from(vote.v), f64::from(vote.u), 1.0);
-                    normal += weight * row * row.transpose();
-                    right += weight * f64::from(vote.d) * row;
+                    fit.add(*vote, (1.0 - ratio * ratio).powi(2));
                 }
             }
-            let solution = normal.try_inverse()? * right;
-            plane = Plane::new(solution.x as f32, solution.y as f32, solution.z as f32, rig)?;
+            let [a, b, c] = fit.solve()?;
+            plane = Plane::new(a, b, c, rig)?;
         }
         let (mut below, mut sums) = (0_usize, [0.0_f64; 4]);
         self.seen.clear();
@@ -235,19 +220,7 @@ fn neighbours_on_it(checked: &Image<f32>, x: usize, y: usize, d: f32) -> usize {
 
 /// What a vote says for a plane.
 #[inline]
-fn value(plane: &Plane, vote: Vote) -> f32 {
+fn value(plane: &Plane, vote: Measured) -> f32 {
     let ratio = (vote.d - plane.disparity(vote.u, vote.v)) / TOLERANCE_PX;
     if ratio <= -1.0 { -BELOW } else { (1.0 - ratio * ratio).max(0.0) }
-}
-
-fn through([p, q, r]: [Vote; 3], rig: &StereoRig) -> Option<Plane> {
-    let (du1, dv1, dd1) = (q.u - p.u, q.v - p.v, q.d - p.d);
-    let (du2, dv2, dd2) = (r.u - p.u, r.v - p.v, r.d - p.d);
-    let area = dv1 * du2 - dv2 * du1;
-    if area.abs() < 400.0 {
-        return None;
-    }
-    let a = (dd1 * du2 - dd2 * du1) / area;
-    let b = (dv1 * dd2 - dv2 * dd1) / area;
-    Plane::new(a, b, p.d - a * p.v - b * p.u, rig)
 }
