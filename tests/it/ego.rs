@@ -32,7 +32,7 @@ fn frame(shift: impl Fn(f64, f64) -> (f64, f64)) -> Image<u8> {
     })
 }
 
-/// Motion per cell, and what a tenth exceeds; `None` where the flow tells nothing.
+/// Motion per cell, and that of the movers; `None` where the flow tells nothing.
 fn motion(
     before: &Image<u8>,
     now: &Image<u8>,
@@ -71,6 +71,44 @@ fn motion(
         .collect();
     assert!(found.windows(2).all(|pair| pair[0] == pair[1]), "every level finds the same");
     found.swap_remove(0)
+}
+
+#[test]
+fn what_movers_moved_is_remembered_a_while() {
+    let thing = |x: f64, y: f64| (60.0..92.0).contains(&x) && (36.0..64.0).contains(&y);
+    let before = frame(|_, _| (0.0, 0.0));
+    let moved = frame(|x, y| if thing(x, y) { (3.0, 1.0) } else { (0.0, 0.0) });
+    let full = Size::new(4 * CELLS.width, 4 * CELLS.height);
+    let camera = |shift| Camera::pinhole(full, F, 320.0, 192.0, shift);
+    let rig = StereoRig::new(camera(0.0), camera(-0.5 * F), 0.0).unwrap();
+    let coarse = CoarseDisparity { checked: Image::new(CELLS), filled: Image::new(CELLS) };
+    let mut ego = EgoMotion::new(simd::detect());
+    let mut most = |now: &Image<u8>| {
+        let cells = View { gray: now.clone(), ..View::default() };
+        let mut flow = Flow::new(simd::detect());
+        flow.run(&before, now);
+        flow.sharpen();
+        let scene = AttentionScene {
+            stamp: Stamp::default(),
+            left: &cells,
+            cells: &cells,
+            coarse: &coarse,
+            rig: &rig,
+            previous: None,
+            flow: Some(&flow),
+        };
+        ego.run(&flow, &scene, false).then_some(ego.most)
+    };
+    let moving = most(&moved).unwrap();
+    assert!(moving > 0.5, "{moving}");
+    let [first, second] = [most(&before).unwrap(), most(&before).unwrap()];
+    assert!(first > 0.7 * moving && first < moving, "{moving}, then {first}");
+    assert!(second < first, "{first}, then {second}");
+    // Another scene: nothing is known, and nothing remembered.
+    let flat = Image::filled(CELLS, 90);
+    assert_eq!(most(&flat), None);
+    let rest = most(&before).unwrap();
+    assert!(rest < 0.5 * second, "{second}, then {rest}");
 }
 
 fn mean(map: &Image<f32>, inside: impl Fn(usize, usize) -> bool) -> f32 {

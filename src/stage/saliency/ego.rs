@@ -36,6 +36,12 @@ const RIDGE: f64 = 1e-4;
 /// Inverse distances are counted in these per metre, to be of the order of the others.
 const PER_METRE: f32 = 10.0;
 
+/// Share of the blocks that the movers of a view exceed.
+const MOVERS: f32 = 0.05;
+/// What is left after a frame of what they moved more than now: they stop for
+/// a frame, and what rests would flare up.
+const HELD: f32 = 0.8;
+
 type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Unknowns = SVector<f64, UNKNOWNS>;
 
@@ -62,7 +68,7 @@ pub struct EgoMotion {
     blocks: Image<f32>,
     /// `C_M` per cell, 0..=1.
     pub motion: Image<f32>,
-    /// `C_M` that a tenth of the blocks exceeds.
+    /// `C_M` that a twentieth of the blocks exceeds; it falls slowly.
     pub most: f32,
 }
 
@@ -90,6 +96,7 @@ impl EgoMotion {
     /// motion field of a rigid scene (Longuet-Higgins and Prazdny 1980), linear
     /// in the camera's translation and rotation, else an affine flow.
     pub fn run(&mut self, flow: &Flow, scene: &AttentionScene<'_>, has_depth: bool) -> bool {
+        let held = HELD * std::mem::take(&mut self.most);
         let trust = flow.trust.pixels().iter().sum::<f32>();
         if trust < LEAST_TRUST * flow.trust.size().area() as f32 {
             return false;
@@ -109,14 +116,23 @@ impl EgoMotion {
         }
         self.blocks.resize(flow.blocks.size());
         let residuals = self.residuals.as_flattened();
-        let blocks = self.blocks.pixels_mut().iter_mut();
-        for ((out, block), r) in blocks.zip(flow.blocks.pixels()).zip(residuals) {
-            *out = block.firmness * (1.0 - (-0.5 * (r / (3.0 * spread)).powi(2)).exp());
+        let cells = scene.cells.gray.size();
+        let width = self.blocks.width();
+        let blocks = self.blocks.pixels_mut().iter_mut().enumerate();
+        for ((i, out), (block, r)) in blocks.zip(flow.blocks.pixels().iter().zip(residuals)) {
+            let [u, v] = self.equations[i / LANES].expected(&found, i % LANES);
+            let [x, y] = [i % width, i / width].map(|at| (at * CELL + CELL / 2) as f64);
+            // What was out of view has no past that could have moved.
+            let was_seen = (0.0..cells.width as f64).contains(&(x + u))
+                && (0.0..cells.height as f64).contains(&(y + v));
+            let motion = block.firmness * (1.0 - (-0.5 * (r / (3.0 * spread)).powi(2)).exp());
+            *out = if was_seen { motion } else { 0.0 };
         }
         self.ranked.clear();
         self.ranked.extend_from_slice(self.blocks.pixels());
-        let tenth = self.ranked.len() - 1 - self.ranked.len() / 10;
-        self.most = *self.ranked.select_nth_unstable_by(tenth, f32::total_cmp).1;
+        let rank = ((1.0 - MOVERS) * (self.ranked.len() - 1) as f32) as usize;
+        let now = *self.ranked.select_nth_unstable_by(rank, f32::total_cmp).1;
+        self.most = now.max(held + (1.0 - HELD) * now);
         upsample(&self.blocks, scene.cells.gray.size(), &mut self.motion);
         true
     }
@@ -200,6 +216,11 @@ impl EgoMotion {
 }
 
 impl Equations {
+    /// The shift of a block under the motion that was found.
+    fn expected(&self, found: &Unknowns, lane: usize) -> [f64; 2] {
+        self.rows.map(|row| row.iter().zip(found.iter()).map(|(c, f)| f64::from(c[lane]) * f).sum())
+    }
+
     /// Lengths of what is left of the shifts.
     #[inline(always)]
     fn residuals(&self, found: &[f32; UNKNOWNS], out: &mut Lanes) {

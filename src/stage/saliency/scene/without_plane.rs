@@ -24,6 +24,10 @@ const FULL_BOUNDARY: f32 = 12.0;
 const RELIEF: f32 = 0.1;
 /// What rests is worth beside what moves as this to this and 1.
 const REST: f32 = 0.5;
+/// Motion of the movers from which it says anything, and from which all: in a
+/// small view or of people some blocks always differ from the camera's motion.
+const LEAST_MOTION: f32 = 0.4;
+const FULL_MOTION: f32 = 0.6;
 
 /// Where the two classes of a still are to be parted, and the least value at
 /// which they are taken for two.
@@ -55,9 +59,10 @@ impl WithoutPlane {
     ///   such a picture is of things more often than not. With disparity a bare
     ///   table or wall may fill the view, whose shading the boundary contrast
     ///   takes for a thing;
-    /// - in a video (`C_MB` + .1 relief) · exp(−r²) · (.5 + `C_M`) / (.5 + m),
-    ///   limited to 1, where m is the motion that a tenth of the view exceeds:
-    ///   where all rests motion says nothing.
+    /// - in a video (`C_MB` + .1 relief) · exp(−r²) · (1 − w + w (.5 + `C_M`) / (.5 + m)),
+    ///   the quotient limited to 1, where m is the motion of the movers
+    ///   ([`EgoMotion::most`]) and w goes from 0 at m = .4 to 1 at .6: where all
+    ///   rests motion says nothing.
     pub fn run(
         &mut self,
         scene: &AttentionScene<'_>,
@@ -74,6 +79,7 @@ impl WithoutPlane {
             None if has_depth => (FULL_BARRIER, SPREAD),
             None => (FULL_BARRIER_PICTURE, SPREAD_PICTURE),
         };
+        let stirs = Stirs::new(cues.motion);
         let (width, height) = (out.width() as f32, out.height() as f32);
         for y in 0..out.height() {
             let (barrier, relief) = (cues.barrier.row(y), cues.relief.row(y));
@@ -87,12 +93,31 @@ impl WithoutPlane {
                 } else {
                     barrier + RELIEF * relief[x] / 255.0
                 };
-                let stirs = cues.motion.map_or(1.0, |ego| {
-                    ((REST + ego.motion.get(x, y)) / (REST + ego.most)).min(1.0)
-                });
+                let stirs = stirs.at(x, y);
                 *out = (appearance * (-spread * (u * u + v * v)).exp() * stirs).min(1.0);
             }
         }
+    }
+}
+
+/// What a cell is worth for its motion.
+struct Stirs<'a> {
+    motion: Option<&'a EgoMotion>,
+    weight: f32,
+}
+
+impl<'a> Stirs<'a> {
+    fn new(motion: Option<&'a EgoMotion>) -> Self {
+        let most = motion.map_or(0.0, |ego| ego.most);
+        let weight = ((most - LEAST_MOTION) / (FULL_MOTION - LEAST_MOTION)).clamp(0.0, 1.0);
+        Self { motion, weight }
+    }
+
+    fn at(&self, x: usize, y: usize) -> f32 {
+        self.motion.map_or(1.0, |ego| {
+            let beside = ((REST + ego.motion.get(x, y)) / (REST + ego.most)).min(1.0);
+            1.0 - self.weight * (1.0 - beside)
+        })
     }
 }
 
