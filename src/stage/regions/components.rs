@@ -52,6 +52,28 @@ impl PixelBox {
     pub const fn height(&self) -> usize {
         self.y1 - self.y0
     }
+
+    /// Takes those pixels of row `y` in whose bit is set, column `x` being the lowest.
+    #[inline(always)]
+    pub fn add(&mut self, x: usize, y: usize, bits: u64) {
+        if bits != 0 {
+            self.join(&Self {
+                x0: x + bits.trailing_zeros() as usize,
+                y0: y,
+                x1: x + 64 - bits.leading_zeros() as usize,
+                y1: y + 1,
+                area: bits.count_ones() as usize,
+            });
+        }
+    }
+
+    /// Takes the pixels of `other` in, which are others.
+    #[inline(always)]
+    pub fn join(&mut self, other: &Self) {
+        (self.x0, self.x1) = (self.x0.min(other.x0), self.x1.max(other.x1));
+        (self.y0, self.y1) = (self.y0.min(other.y0), self.y1.max(other.y1));
+        self.area += other.area;
+    }
 }
 
 /// What may become a region: an id for every pixel, and a box for every id.
@@ -68,7 +90,7 @@ impl Candidates {
     pub fn clear(&mut self, size: Size, count: usize) {
         if self.ids.size() == size {
             // What is set lies in the boxes.
-            for b in self.boxes.iter().filter(|b| b.area > 0) {
+            for b in self.boxes.iter().filter(|b| b.x0 < b.x1) {
                 for y in b.y0..b.y1 {
                     self.ids.row_mut(y)[b.x0..b.x1].fill(0);
                 }
@@ -79,25 +101,6 @@ impl Candidates {
         }
         self.boxes.clear();
         self.boxes.resize(count, PixelBox::NONE);
-    }
-
-    /// Gives those of `columns` pixels of row `y` from column `x` on to
-    /// candidate `id` whose bit is set, the first pixel's being the lowest.
-    #[inline(always)]
-    pub fn mark(&mut self, id: u32, x: usize, y: usize, columns: usize, bits: u32) {
-        let bits = bits & ((1 << columns) - 1);
-        if bits == 0 {
-            return;
-        }
-        for (i, pixel) in self.ids.row_mut(y)[x..x + columns].iter_mut().enumerate() {
-            *pixel = if bits >> i & 1 == 1 { id } else { *pixel };
-        }
-        let b = &mut self.boxes[id as usize - 1];
-        b.x0 = b.x0.min(x + bits.trailing_zeros() as usize);
-        b.x1 = b.x1.max(x + 32 - bits.leading_zeros() as usize);
-        b.y0 = b.y0.min(y);
-        b.y1 = b.y1.max(y + 1);
-        b.area += bits.count_ones() as usize;
     }
 
     /// Numbers the boxes again from `ids`, of which there are `count`.

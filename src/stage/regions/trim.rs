@@ -129,7 +129,8 @@ mod tests {
         let mut out = Candidates::default();
         out.clear(SIZE, 2);
         for y in 2..18 {
-            out.mark(2, 10, y, 16, 0xffff);
+            out.ids.row_mut(y)[10..26].fill(2);
+            out.boxes[1].add(10, y, 0xffff);
         }
         Trim { rgb: &rgb, disparity: &disparity, surface: 10.0 }.run(2, &mut out);
         let area = out.ids.pixels().iter().filter(|id| **id == 2).count();

@@ -1,0 +1,343 @@
+//! From cells to pixels: the things' own outlines.
+
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u8x16};
+use crate::stage::ground::Plane;
+use crate::stage::regions::RegionSource;
+use crate::stage::regions::components::{Candidates, PixelBox, tolerance};
+use crate::stage::roi::bits::BitMask;
+use crate::stage::standing::{HIGH, Things, WIDE};
+
+/// Largest difference of a pixel from its surface in parts of the disparity.
+const SURFACE_PART: f32 = 0.1;
+const SURFACE_PX: f32 = 0.7;
+/// Pixels of disparity by which one of a thing's exceeds the ground's.
+const GROUND_PX: f32 = 0.3;
+
+/// Pixels of a row that are painted at once.
+const LANES: usize = 16;
+
+/// The bits of the left pixels of cells, and of the pixels of the first.
+const LEFT: u64 = 0x5555;
+const CELL_BITS: u64 = (1 << WIDE) - 1;
+
+// A group is made of whole cells of two pixels.
+const _: () = assert!(WIDE == 2 && LANES == 16);
+
+/// What holes in a cell are: none of the thing, of the thing where nothing was
+/// matched, of the thing.
+const OUTSIDE: u8 = 0;
+const OWN: u8 = 1;
+const INSIDE: u8 = 2;
+
+/// The painter with its buffers: one row of cells, and what each of its pixels
+/// must agree with.
+#[derive(Debug)]
+pub struct Painter {
+    level: Level,
+    /// The row's own ids and surfaces, with an empty cell on either side.
+    own: Vec<u32>,
+    own_surface: Vec<f32>,
+    /// What stands for the row below the last one.
+    nothing: Vec<u32>,
+    /// Whose pixels a cell may have, where the surface is and how far from it
+    /// a pixel may be.
+    ids: Vec<u32>,
+    surface: Vec<f32>,
+    tolerance: Vec<f32>,
+    /// Per pixel of a row the same, what a hole is, and the ground's change along it.
+    surfaces: Vec<f32>,
+    tolerances: Vec<f32>,
+    holes: Vec<u8>,
+    slopes: Vec<f32>,
+}
+
+impl Painter {
+    /// The painter with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self {
+            level,
+            own: Vec::new(),
+            own_surface: Vec::new(),
+            nothing: Vec::new(),
+            ids: Vec::new(),
+            surface: Vec::new(),
+            tolerance: Vec::new(),
+            surfaces: Vec::new(),
+            tolerances: Vec::new(),
+            holes: Vec::new(),
+            slopes: Vec::new(),
+        }
+    }
+
+    /// Fills `out` with `count` candidates from as many `things`: those pixels
+    /// of a thing's cells that do not contradict its surface, and those of the
+    /// cells beside and above that agree with it. Bits of `fine` are cells whose
+    /// disparity was measured finely.
+    pub fn run(
+        &mut self,
+        plane: &Plane,
+        source: &RegionSource<'_>,
+        (things, fine): (&Things, &BitMask),
+        count: usize,
+        out: &mut Candidates,
+    ) {
+        out.clear(source.disparity.size(), count);
+        self.fit(things.ids.width(), plane);
+        for cy in 0..things.ids.height() {
+            let row = things.ids.row(cy);
+            let next = cy + 1;
+            let below = if next < things.ids.height() { things.ids.row(next) } else { &[] };
+            if row.iter().chain(below).all(|id| *id == 0) {
+                continue;
+            }
+            self.own[1..=row.len()].copy_from_slice(row);
+            self.own_surface[1..=row.len()].copy_from_slice(things.surface.row(cy));
+            self.holes.fill(OUTSIDE);
+            enclose(row, fine.row(cy), &mut self.holes);
+            let surfaces = things.surface.row(if below.is_empty() { cy } else { next });
+            dispatch!(self.level, simd => {
+                self.prepare(below, surfaces);
+                self.paint(simd, plane, source, cy, out);
+            });
+        }
+    }
+
+    /// Buffers for rows of `width` cells.
+    fn fit(&mut self, width: usize, plane: &Plane) {
+        for buffer in [&mut self.own, &mut self.nothing] {
+            buffer.clear();
+            buffer.resize(width + 2, 0);
+        }
+        self.own_surface.resize(width + 2, 0.0);
+        self.ids.resize(width, 0);
+        self.surface.resize(width, 0.0);
+        self.tolerance.resize(width, 0.0);
+        // Whole groups from any pixel on.
+        let pixels = width * WIDE + LANES;
+        self.holes.resize(pixels, OUTSIDE);
+        for buffer in [&mut self.surfaces, &mut self.tolerances, &mut self.slopes] {
+            buffer.resize(pixels, 0.0);
+        }
+        for (x, slopes) in self.slopes.chunks_exact_mut(WIDE).enumerate() {
+            slopes.fill(plane.b * ((x * WIDE) as f32 + 0.5));
+        }
+    }
+
+    /// Whose each cell of the row is: its own thing's, else that of the cell to
+    /// the left, to the right or below.
+    #[inline(always)]
+    fn prepare(&mut self, below: &[u32], below_surface: &[f32]) {
+        let width = self.ids.len();
+        let low = if below.is_empty() { &self.nothing[..width] } else { &below[..width] };
+        let (own, left, right) = (&self.own[1..=width], &self.own[..width], &self.own[2..]);
+        let surfaces = &self.own_surface;
+        let (own_at, left_at, right_at) =
+            (&surfaces[1..=width], &surfaces[..width], &surfaces[2..]);
+        let (right, right_at, low_at) =
+            (&right[..width], &right_at[..width], &below_surface[..width]);
+        let ids = &mut self.ids[..width];
+        let (surface, limit) = (&mut self.surface[..width], &mut self.tolerance[..width]);
+        for x in 0..width {
+            let (o, l, r) = (own[x], left[x], right[x]);
+            let (at, at_left, at_right) = (own_at[x], left_at[x], right_at[x]);
+            let (id, d) = (low[x], low_at[x]);
+            let (id, d) = if r == 0 { (id, d) } else { (r, at_right) };
+            let (id, d) = if l == 0 { (id, d) } else { (l, at_left) };
+            let (id, d) = if o == 0 { (id, d) } else { (o, at) };
+            ids[x] = id;
+            surface[x] = d;
+            limit[x] = if o == 0 { tolerance(d) } else { (SURFACE_PART * d).max(SURFACE_PX) };
+        }
+        let spread = [(&self.surface, &mut self.surfaces), (&self.tolerance, &mut self.tolerances)];
+        for (cells, pixels) in spread {
+            let pixels = pixels.as_chunks_mut::<WIDE>().0;
+            for (pixels, cell) in pixels.iter_mut().zip(&cells[..width]) {
+                *pixels = [*cell; WIDE];
+            }
+        }
+    }
+
+    /// Gives those pixels of a row of cells to their things that are on their
+    /// surfaces, and the holes in them.
+    #[inline(always)]
+    fn paint<S: Simd>(
+        &self,
+        simd: S,
+        plane: &Plane,
+        source: &RegionSource<'_>,
+        cy: usize,
+        out: &mut Candidates,
+    ) {
+        let size = source.disparity.size();
+        let rows = cy * HIGH..((cy + 1) * HIGH).min(size.height);
+        let mut next = 0;
+        while let Some((id, cells)) = run(&self.ids, next) {
+            next = cells.end;
+            let columns = cells.start * WIDE..(cells.end * WIDE).min(size.width);
+            let mut painted = PixelBox::NONE;
+            for x in columns.clone().step_by(LANES) {
+                let surface = f32x16::from_slice(simd, &self.surfaces[x..x + LANES]);
+                let tolerance = f32x16::from_slice(simd, &self.tolerances[x..x + LANES]);
+                let slope = f32x16::from_slice(simd, &self.slopes[x..x + LANES]);
+                let holes = u8x16::from_slice(simd, &self.holes[x..x + LANES]);
+                let own = holes.simd_ge(u8x16::splat(simd, OWN)).to_bitmask();
+                let inside = holes.simd_eq(u8x16::splat(simd, INSIDE)).to_bitmask();
+                let all = u64::MAX >> (64 - LANES.min(columns.end - x));
+                for y in rows.clone() {
+                    // What does not rise above the ground is none of the thing.
+                    let ground = slope + plane.a * y as f32 + plane.c + GROUND_PX;
+                    let d = f32x16::from_slice(simd, &load(source.disparity.row(y), x, f32::NAN));
+                    let on = (d - surface).abs().simd_le(tolerance) & d.simd_gt(ground);
+                    let mut bits = on.to_bitmask() & all;
+                    let holes = !d.simd_eq(d).to_bitmask() & own & all;
+                    if holes != 0 {
+                        let matched = load(source.roi.matched.row(y), x, 0);
+                        let zero = u8x16::splat(simd, 0);
+                        let none = u8x16::from_slice(simd, &matched).simd_eq(zero).to_bitmask();
+                        // The left pixel of a cell tells.
+                        bits |= holes & (inside | ((none & LEFT) * CELL_BITS));
+                    }
+                    write(&mut out.ids.row_mut(y)[x..], id, bits);
+                    painted.add(x, y, bits);
+                }
+            }
+            out.boxes[id as usize - 1].join(&painted);
+        }
+    }
+}
+
+/// The first run of cells of one thing from cell `from` on.
+#[inline(always)]
+pub fn run(ids: &[u32], from: usize) -> Option<(u32, std::ops::Range<usize>)> {
+    let start = same(ids, from, 0);
+    let id = *ids.get(start)?;
+    Some((id, start..same(ids, start, id)))
+}
+
+/// The first cell from cell `from` on that does not have this id.
+#[inline(always)]
+fn same(ids: &[u32], mut from: usize, id: u32) -> usize {
+    while let Some(group) = ids[from..].first_chunk::<8>() {
+        let mut others = 0;
+        for other in group {
+            others |= other ^ id;
+        }
+        if others != 0 {
+            break;
+        }
+        from += group.len();
+    }
+    from + ids[from..].iter().take_while(|other| **other == id).count()
+}
+
+/// The values from `x` on; `beyond` where the row has ended.
+#[inline(always)]
+fn load<T: Copy>(row: &[T], x: usize, beyond: T) -> [T; LANES] {
+    let row = &row[x..];
+    if let Some(values) = row.first_chunk() {
+        return *values;
+    }
+    let mut values = [beyond; LANES];
+    values[..row.len()].copy_from_slice(row);
+    values
+}
+
+/// Writes `id` where bits are set and 0 elsewhere: what is to the right comes later.
+#[inline(always)]
+fn write(row: &mut [u32], id: u32, bits: u64) {
+    if let Some(row) = row.first_chunk_mut::<LANES>() {
+        for (i, pixel) in row.iter_mut().enumerate() {
+            *pixel = if bits >> i & 1 == 1 { id } else { 0 };
+        }
+    } else {
+        for (i, pixel) in row.iter_mut().enumerate() {
+            *pixel = if bits >> i & 1 == 1 { id } else { 0 };
+        }
+    }
+}
+
+/// Fills `holes`, per pixel, for the cells of things in a row. A hole is inside
+/// of a thing where there are fine cells of the thing on both sides (or the edge
+/// of the image) before those of anything else: what only one camera sees at
+/// the sides of a thing belongs to what is behind it.
+fn enclose(ids: &[u32], fine: &[u64], holes: &mut [u8]) {
+    let mut next = 0;
+    while let Some((id, cells)) = run(ids, next) {
+        next = cells.end;
+        let own = |cell: usize| ids[cell] == id;
+        let left = last_set(fine, cells.start).is_none_or(own);
+        let right = first_set(fine, cells.end).is_none_or(own);
+        let first = first_set(fine, cells.start).unwrap_or(cells.end);
+        let last = last_set(fine, cells.end);
+        for cell in cells {
+            let inside = (left || cell > first) && (right || last.is_some_and(|last| cell < last));
+            holes[cell * WIDE..][..WIDE].fill(if inside { INSIDE } else { OWN });
+        }
+    }
+}
+
+/// The first set bit from bit `from` on.
+fn first_set(words: &[u64], from: usize) -> Option<usize> {
+    let mut index = from / 64;
+    let mut word = words.get(index)? & (u64::MAX << (from % 64));
+    while word == 0 {
+        index += 1;
+        word = *words.get(index)?;
+    }
+    Some(index * 64 + word.trailing_zeros() as usize)
+}
+
+/// The last set bit before bit `to`.
+fn last_set(words: &[u64], to: usize) -> Option<usize> {
+    let mut index = to / 64;
+    let mut word = words.get(index).map_or(0, |word| word & !(u64::MAX << (to % 64)));
+    while word == 0 {
+        index = index.checked_sub(1)?;
+        word = words[index];
+    }
+    Some(index * 64 + 63 - word.leading_zeros() as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hole_belongs_to_a_thing_that_is_measured_on_both_sides() {
+        // Edge, hole, thing 1, hole, thing 1, hole, thing 2, hole, what is none.
+        let ids = [1, 1, 1, 1, 1, 1, 2, 2, 0];
+        let fine = [0b1_0101_0100];
+        let mut holes = [OUTSIDE; 9 * WIDE];
+        enclose(&ids, &fine, &mut holes);
+        let expected = [INSIDE, INSIDE, INSIDE, INSIDE, OWN, OWN, OWN, OWN, OUTSIDE];
+        assert_eq!(holes.as_chunks::<WIDE>().0, expected.map(|hole| [hole; WIDE]));
+    }
+
+    #[test]
+    fn bits_are_found_across_words() {
+        let words = [1 << 63, 0, 1 << 5];
+        assert_eq!(first_set(&words, 0), Some(63));
+        assert_eq!(first_set(&words, 64), Some(133));
+        assert_eq!(first_set(&words, 134), None);
+        assert_eq!(last_set(&words, 192), Some(133));
+        assert_eq!(last_set(&words, 133), Some(63));
+        assert_eq!(last_set(&words, 63), None);
+    }
+
+    #[test]
+    fn runs_end_where_the_id_changes() {
+        let ids = [[0; 11].as_slice(), &[3; 9], &[4; 1], &[0; 2], &[4; 17]].concat();
+        let mut found = Vec::new();
+        let mut next = 0;
+        while let Some((id, cells)) = run(&ids, next) {
+            next = cells.end;
+            found.push((id, cells));
+        }
+        assert_eq!(found, [(3, 11..20), (4, 20..21), (4, 23..40)]);
+    }
+}

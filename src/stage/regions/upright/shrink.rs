@@ -1,0 +1,173 @@
+//! From pixels to cells: the median disparity of each.
+
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
+use crate::image::Image;
+use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u8x32};
+use crate::stage::coarse::CELL;
+use crate::stage::regions::RegionSource;
+use crate::stage::roi::bits::BitMask;
+use crate::stage::standing::{HIGH, WIDE, cells};
+
+/// Places in a cell whose disparities are asked; their median is the cell's.
+const SAMPLES: [(usize, usize); 4] = [(0, 0), (1, 1), (0, 2), (1, 3)];
+/// A sorting network of as many (Batcher 1968).
+const EXCHANGES: [(usize, usize); 5] = [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)];
+/// Samples with disparity that a cell needs.
+const LEAST_SAMPLES: usize = 2;
+
+/// Cells whose medians are taken at once, and their pixels in a row.
+const LANES: usize = 16;
+const PIXELS: usize = LANES * WIDE;
+/// Coarse cells of as many pixels.
+const COARSE: usize = PIXELS / CELL;
+
+// A row of cells is a row of coarse cells, and a group's bits are a part of a word.
+const _: () = assert!(HIGH == CELL && WIDE == 2 && 2 * WIDE == CELL && 64 % LANES == 0);
+
+/// Fills `map` with the disparity of each cell, and sets the bit in `fine` of
+/// those whose disparity is a fine one, because they lie in what was matched.
+pub fn shrink(level: Level, source: &RegionSource<'_>, map: &mut Image<f32>, fine: &mut BitMask) {
+    let size = source.disparity.size();
+    map.resize(cells(size));
+    fine.reset(cells(size));
+    let offset = source.rig.disparity_offset() as f32;
+    for cy in 0..map.height() {
+        let rows: [usize; HIGH] = std::array::from_fn(|i| (cy * HIGH + i).min(size.height - 1));
+        let row = Row {
+            disparity: rows.map(|y| source.disparity.row(y)),
+            matched: [rows[0], rows[HIGH - 1]].map(|y| source.roi.matched.row(y)),
+            coarse: source.coarse.checked.row(cy),
+            offset,
+        };
+        dispatch!(level, simd => row.shrink(simd, map.row_mut(cy), fine.row_mut(cy)));
+    }
+}
+
+/// What one row of cells is made from.
+struct Row<'a> {
+    disparity: [&'a [f32]; HIGH],
+    /// The first and the last row.
+    matched: [&'a [u8]; 2],
+    coarse: &'a [f32],
+    offset: f32,
+}
+
+impl Row<'_> {
+    #[inline(always)]
+    fn shrink<S: Simd>(&self, simd: S, map: &mut [f32], fine: &mut [u64]) {
+        for (i, map) in map.chunks_mut(LANES).enumerate() {
+            let x = i * PIXELS;
+            // What was not matched finely is known coarsely.
+            let coarse: [f32; LANES] = group(self.coarse, i * COARSE, f32::NAN);
+            let coarse = f32x16::from_slice(simd, &coarse) - self.offset;
+            let mut values = coarse.zip_low(coarse);
+            let matched = cells_of(simd, self.matched.map(|row| group(row, x, 0)));
+            if matched != 0 {
+                let medians = medians_of(simd, &self.disparity, x);
+                let known = medians.simd_eq(medians).to_bitmask() & matched;
+                values = mask32x16::from_bitmask(simd, known).select(medians, values);
+                fine[i * LANES / 64] |= known << (i * LANES % 64);
+            }
+            if map.len() == LANES {
+                values.store_slice(map);
+            } else {
+                map.copy_from_slice(&values.as_slice()[..map.len()]);
+            }
+        }
+    }
+}
+
+/// One bit for each cell of which a pixel of one of two rows is not 0.
+#[inline(always)]
+fn cells_of<S: Simd>(simd: S, [upper, lower]: [[u8; PIXELS]; 2]) -> u64 {
+    let any = u8x32::from_slice(simd, &upper) | u8x32::from_slice(simd, &lower);
+    let bits = !any.simd_eq(u8x32::splat(simd, 0)).to_bitmask();
+    // The even bits move together.
+    let mut bits = (bits | bits >> 1) & 0x5555_5555;
+    bits = (bits | bits >> 1) & 0x3333_3333;
+    bits = (bits | bits >> 2) & 0x0f0f_0f0f;
+    bits = (bits | bits >> 4) & 0x00ff_00ff;
+    (bits | bits >> 8) & 0xffff
+}
+
+/// The values from `at` on; `beyond` where the row has ended.
+#[inline(always)]
+fn group<T: Copy, const N: usize>(row: &[T], at: usize, beyond: T) -> [T; N] {
+    let row = &row[at.min(row.len())..];
+    if let Some(values) = row.first_chunk() {
+        return *values;
+    }
+    let mut values = [beyond; N];
+    values[..row.len()].copy_from_slice(row);
+    values
+}
+
+/// Median disparity of some of the pixels of each of several cells, whose rows
+/// are given, from column `from` on; NaN with too few.
+#[inline(always)]
+fn medians_of<S: Simd>(simd: S, rows: &[&[f32]; HIGH], from: usize) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let nowhere = f32x16::splat(simd, f32::INFINITY);
+    let mut sorted = [zero; SAMPLES.len()];
+    let mut n = zero;
+    for (sample, (dx, dy)) in sorted.iter_mut().zip(SAMPLES) {
+        // The last column goes on beyond the edge.
+        let pixels: [f32; PIXELS] = group(rows[dy], from, rows[dy][rows[dy].len() - 1]);
+        let (left, right) = pixels.split_at(LANES);
+        let (left, right) = (f32x16::from_slice(simd, left), f32x16::from_slice(simd, right));
+        let d = if dx == 0 { left.unzip_low(right) } else { left.unzip_high(right) };
+        // Holes go to the end.
+        let known = d.simd_eq(d);
+        n += known.select(one, zero);
+        *sample = known.select(d, nowhere);
+    }
+    for (i, j) in EXCHANGES {
+        (sorted[i], sorted[j]) = (sorted[i].min(sorted[j]), sorted[i].max(sorted[j]));
+    }
+    // The upper one of an even number.
+    let mut medians = f32x16::splat(simd, f32::NAN);
+    for count in LEAST_SAMPLES..=SAMPLES.len() {
+        medians = n.simd_eq(count as f32).select(sorted[count / 2], medians);
+    }
+    medians
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd;
+
+    #[test]
+    fn the_median_is_that_of_the_samples_that_there_are() {
+        // Every pattern of holes, in each cell another order of the values.
+        for holes in 0_u32..16 {
+            let mut values = [[0.0_f32; PIXELS]; HIGH];
+            let mut kept = [(); LANES].map(|()| Vec::new());
+            for (turn, kept) in kept.iter_mut().enumerate() {
+                for (i, (x, y)) in SAMPLES.into_iter().enumerate() {
+                    let hole = holes >> i & 1 == 1;
+                    let value = ((i * 3 + turn) % 4) as f32;
+                    values[y][turn * WIDE + x] = if hole { f32::NAN } else { value };
+                    kept.extend((!hole).then_some(value));
+                }
+                kept.sort_by(f32::total_cmp);
+            }
+            let rows: [&[f32]; HIGH] = std::array::from_fn(|y| &values[y][..]);
+            for level in simd::available() {
+                let found: [f32; LANES] =
+                    dispatch!(level, simd => medians_of(simd, &rows, 0).to_array());
+                for (kept, found) in kept.iter().zip(found) {
+                    if kept.len() < LEAST_SAMPLES {
+                        assert!(found.is_nan());
+                    } else {
+                        assert_eq!(found.to_bits(), kept[kept.len() / 2].to_bits(), "{holes:b}");
+                    }
+                }
+            }
+        }
+    }
+}
