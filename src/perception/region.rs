@@ -168,7 +168,8 @@ pub struct Rejections {
     /// Goes on above a lorry's height, or shows only between nearer things: a
     /// house front.
     pub background: u32,
-    /// Stands there, but the attention map passes over it.
+    /// Stands there, but the attention map passes over it; without a plane: weighs
+    /// little beside the weightiest region.
     pub not_salient: u32,
     /// Seen in too few of the last frames.
     pub unstable: u32,

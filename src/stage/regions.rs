@@ -33,6 +33,9 @@ const MIN_MEAN_CONFIDENCE: f32 = 0.1;
 /// has 0.3; a strip of road 0.55; wrong matches all over the range 0.65.
 const MAX_SPREAD_PX: f32 = 1.0;
 const MAX_SPREAD_PART: f32 = 0.4;
+/// Without a plane, the sum of saliency from which a candidate counts, in parts
+/// of the largest one: patterns and edges fall into many small ones.
+const LEAST_WEIGHT: f32 = 0.05;
 /// Weights of the confidence: logistic regression on 800 regions of a rendered
 /// street, a rendered table and photographed tables; calibration error .06 on the
 /// street and .04 on the tables, .13 on the street when that is left out of the
@@ -147,6 +150,9 @@ impl Regions {
             let count = evidence.next().and_then(|e| refusal(e, region, rejections));
             count.map(|count| *count += 1).is_none()
         });
+        if source.plane.is_none() && source.table.is_none() {
+            retain_weighty(regions, rejections);
+        }
         regions.sort_unstable_by(|a, b| {
             priority(b).total_cmp(&priority(a)).then((a.y, a.x).cmp(&(b.y, b.x)))
         });
@@ -221,6 +227,15 @@ fn confidence(region: &Region) -> f32 {
 pub fn priority(region: &Region) -> f32 {
     let near = NEAR_M / (NEAR_M + region.median_depth);
     region.mean_saliency * region.confidence * if near.is_nan() { 0.1 } else { near }
+}
+
+/// Drops what weighs little beside the weightiest one, area x mean saliency.
+fn retain_weighty(regions: &mut RegionList, rejections: &mut Rejections) {
+    let weight = |region: &Region| region.mean_saliency * region.area as f32;
+    let most = regions.iter().map(weight).fold(0.0, f32::max);
+    let before = regions.len();
+    regions.retain(|region| weight(region) >= LEAST_WEIGHT * most);
+    rejections.not_salient += (before - regions.len()) as u32;
 }
 
 /// The counter of the reason why a candidate is no region.

@@ -23,6 +23,7 @@ pub mod integral;
 pub mod intensity;
 pub mod lateral;
 pub mod motion;
+pub mod nearness;
 pub mod normalize;
 pub mod orientation;
 pub mod paper;

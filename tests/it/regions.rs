@@ -467,6 +467,26 @@ fn each_refusal_has_its_reason() {
 }
 
 #[test]
+fn without_a_plane_what_weighs_little_beside_the_weightiest_is_passed_over() {
+    let mut scene = Boxes::new(200, 120);
+    scene.add(10, 10, 100, 100, |_, _| 30.0);
+    scene.add(130, 10, 24, 24, |_, _| 9.0);
+    scene.add(130, 60, 20, 20, |_, _| 9.0);
+    let (_, regions, rejections) = scene.run(&Config::default());
+    assert_eq!(regions.iter().map(|r| r.area).collect::<Vec<_>>(), [10_000, 576]);
+    assert_eq!(rejections, Rejections { not_salient: 1, ..Rejections::default() });
+    // One that is refused for another reason weighs nothing.
+    for v in 10..110 {
+        for u in 10..110 {
+            scene.confidence.set(u, v, 0.02);
+        }
+    }
+    let (_, regions, rejections) = scene.run(&Config::default());
+    assert_eq!(regions.len(), 2);
+    assert_eq!(rejections, Rejections { low_confidence: 1, ..Rejections::default() });
+}
+
+#[test]
 fn labels_follow_priority() {
     let mut scene = Boxes::new(200, 60);
     for (i, d) in [8.0, 30.0, 15.0, 60.0].into_iter().enumerate() {

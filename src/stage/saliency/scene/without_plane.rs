@@ -6,6 +6,7 @@ use crate::stage::roi::threshold::otsu;
 use crate::stage::saliency::AttentionScene;
 use crate::stage::saliency::boundary::Boundary;
 use crate::stage::saliency::ego::EgoMotion;
+use crate::stage::saliency::nearness::Nearness;
 
 /// Sum of the barriers of Y, Cb and Cr that counts fully: in a still with
 /// depth, in one without, and in a video.
@@ -22,12 +23,16 @@ const SPREAD_VIDEO: f32 = 1.0;
 const FULL_BOUNDARY: f32 = 12.0;
 /// What a barrier of disparity over the full range adds.
 const RELIEF: f32 = 0.1;
-/// What rests is worth beside what moves as this to this and 1.
+/// What rests is worth beside what moves as this to this and 1, and so is the
+/// background beside what is near.
 const REST: f32 = 0.5;
 /// Motion of the movers from which it says anything, and from which all: in a
 /// small view or of people some blocks always differ from the camera's motion.
 const LEAST_MOTION: f32 = 0.4;
 const FULL_MOTION: f32 = 0.6;
+/// The same for nearness.
+const LEAST_NEARNESS: f32 = 0.3;
+const FULL_NEARNESS: f32 = 0.6;
 
 /// Where the two classes of a still are to be parted, and the least value at
 /// which they are taken for two.
@@ -48,21 +53,25 @@ pub struct Cues<'a> {
 #[derive(Debug, Default)]
 pub struct WithoutPlane {
     boundary: Boundary,
+    nearness: Nearness,
     border: Image<f32>,
 }
 
 impl WithoutPlane {
     /// S per cell, r² being the squared relative distance from the centre:
     ///
-    /// - in a still with depth (`C_MB` + .1 relief) · exp(−2 r²);
+    /// - in a still with depth (`C_MB` + .1 relief) · exp(−2 r²) · n;
     /// - in a picture without it 1.2 · √(`C_MB` · boundary contrast) · exp(−4 r²):
     ///   such a picture is of things more often than not. With disparity a bare
     ///   table or wall may fill the view, whose shading the boundary contrast
     ///   takes for a thing;
-    /// - in a video (`C_MB` + .1 relief) · exp(−r²) · (1 − w + w (.5 + `C_M`) / (.5 + m)),
-    ///   the quotient limited to 1, where m is the motion of the movers
-    ///   ([`EgoMotion::most`]) and w goes from 0 at m = .4 to 1 at .6: where all
-    ///   rests motion says nothing.
+    /// - in a video (`C_MB` + .1 relief) · exp(−r²) · n · m, limited to 1.
+    ///
+    /// n is what a cell is worth for its [`Nearness`] (1 without depth), m for its
+    /// motion: 1 − w + w · min(1, (.5 + c) / (.5 + most)), c being the cue there, `most`
+    /// what a part of the view exceeds. w goes from 0 to 1 as `most` goes from .3 to
+    /// .6, for motion from .4: where nothing is nearer than the rest, or all rests,
+    /// the cue says nothing.
     pub fn run(
         &mut self,
         scene: &AttentionScene<'_>,
@@ -79,7 +88,12 @@ impl WithoutPlane {
             None if has_depth => (FULL_BARRIER, SPREAD),
             None => (FULL_BARRIER_PICTURE, SPREAD_PICTURE),
         };
-        let stirs = Stirs::new(cues.motion);
+        let near = has_depth.then(|| {
+            self.nearness.run(&scene.coarse.filled, scene.rig.disparity_offset() as f32);
+            (&self.nearness, Beside::new(self.nearness.most, LEAST_NEARNESS, FULL_NEARNESS))
+        });
+        let stirs =
+            cues.motion.map(|ego| (&ego.motion, Beside::new(ego.most, LEAST_MOTION, FULL_MOTION)));
         let (width, height) = (out.width() as f32, out.height() as f32);
         for y in 0..out.height() {
             let (barrier, relief) = (cues.barrier.row(y), cues.relief.row(y));
@@ -93,31 +107,31 @@ impl WithoutPlane {
                 } else {
                     barrier + RELIEF * relief[x] / 255.0
                 };
-                let stirs = stirs.at(x, y);
-                *out = (appearance * (-spread * (u * u + v * v)).exp() * stirs).min(1.0);
+                let near = near.as_ref().map_or(1.0, |(nearness, beside)| {
+                    beside.worth(nearness.of(scene.coarse.filled.get(x, y)))
+                });
+                let stirs =
+                    stirs.as_ref().map_or(1.0, |(motion, beside)| beside.worth(motion.get(x, y)));
+                *out = (appearance * (-spread * (u * u + v * v)).exp() * near * stirs).min(1.0);
             }
         }
     }
 }
 
-/// What a cell is worth for its motion.
-struct Stirs<'a> {
-    motion: Option<&'a EgoMotion>,
+/// What cells are worth beside those that have the most of a cue.
+struct Beside {
+    most: f32,
     weight: f32,
 }
 
-impl<'a> Stirs<'a> {
-    fn new(motion: Option<&'a EgoMotion>) -> Self {
-        let most = motion.map_or(0.0, |ego| ego.most);
-        let weight = ((most - LEAST_MOTION) / (FULL_MOTION - LEAST_MOTION)).clamp(0.0, 1.0);
-        Self { motion, weight }
+impl Beside {
+    /// The cue says nothing while it reaches no more than `least`, and all from `full` on.
+    fn new(most: f32, least: f32, full: f32) -> Self {
+        Self { most, weight: ((most - least) / (full - least)).clamp(0.0, 1.0) }
     }
 
-    fn at(&self, x: usize, y: usize) -> f32 {
-        self.motion.map_or(1.0, |ego| {
-            let beside = ((REST + ego.motion.get(x, y)) / (REST + ego.most)).min(1.0);
-            1.0 - self.weight * (1.0 - beside)
-        })
+    fn worth(&self, cue: f32) -> f32 {
+        1.0 - self.weight * (1.0 - ((REST + cue) / (REST + self.most)).min(1.0))
     }
 }
 
