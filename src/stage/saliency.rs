@@ -4,11 +4,6 @@
 //! quarter-size view of the left image is made once per frame and shared by
 //! every cue. The map is smoothed over time and brought to full size at the end.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 pub mod barrier;
 pub mod beside;
 pub mod boundary;
@@ -27,6 +22,7 @@ pub mod nearness;
 pub mod normalize;
 pub mod orientation;
 pub mod paper;
+pub mod persistence;
 pub mod scene;
 pub mod spectral_residual;
 pub mod structure;
@@ -39,7 +35,7 @@ use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
 use crate::perception::View;
-use crate::simd::{Level, dispatch};
+use crate::simd::Level;
 use crate::stage::coarse::{CELL, CoarseDisparity};
 use crate::stage::ground::Footing;
 use crate::stamp::Stamp;
@@ -47,6 +43,7 @@ use crate::stamp::Stamp;
 use flow::Flow;
 use frequency_tuned::FrequencyTuned;
 use paper::Paper;
+use persistence::Persistence;
 use scene::SceneSaliency;
 use spectral_residual::SpectralResidual;
 
@@ -92,6 +89,8 @@ pub struct PreviousFrame {
     pub gray: Image<u8>,
     /// Its attention map after smoothing, one value per cell.
     pub attention: Image<f32>,
+    /// 1 for the cells that were attended to, else 0; empty where that is not kept.
+    pub attended: Image<f32>,
 }
 
 /// The register of the previous frame.
@@ -143,7 +142,7 @@ pub struct Saliency {
     level: Level,
     size: Size,
     mode: Mode,
-    smoothing: f32,
+    persistence: Persistence,
     cells: View,
     flow: Flow,
 }
@@ -164,7 +163,7 @@ impl Saliency {
             level,
             size,
             mode,
-            smoothing: config.saliency.temporal_smoothing as f32,
+            persistence: Persistence::new(config, level),
             cells: View::default(),
             flow: Flow::new(level),
         }
@@ -200,7 +199,7 @@ impl Saliency {
         let compensates = matches!(self.mode, Mode::Scene(_));
         let Self { mode, flow, cells: view, .. } = self;
         let match_blocks = || {
-            if let Some(before) = before.filter(|_| compensates || self.smoothing > 0.0) {
+            if let Some(before) = before.filter(|_| compensates || self.persistence.is_on()) {
                 flow.run(&before.gray, &view.gray);
                 if compensates {
                     flow.sharpen();
@@ -229,46 +228,14 @@ impl Saliency {
             Mode::SpectralResidual(residual) => residual.run(&scene, attention),
             Mode::FullFrame => {}
         }
-        if let Some(before) = before.filter(|_| self.smoothing > 0.0) {
-            let (flow, share) = (&self.flow, self.smoothing);
-            dispatch!(self.level, _simd => smooth(attention, &before.attention, flow, share));
+        if let Some(before) = before.filter(|_| self.persistence.is_on()) {
+            self.persistence.smooth(attention, before, &self.flow);
         }
         previous.set(scene.stamp, &self.cells.gray, attention);
         if let Mode::Scene(mode) = &self.mode {
             mode.even_contrast(attention);
         }
+        self.persistence.stay(attention, &mut previous.frame.attended);
         upsample(attention, self.size, saliency);
     }
-}
-
-/// (1 - a) of this frame's map and a of the one before, the latter read where
-/// each cell was then. What was not seen before has no past: there `a` fades
-/// with the flow's trust, so that a new thing is attended to at once.
-#[inline(always)]
-fn smooth(attention: &mut Image<f32>, before: &Image<f32>, flow: &Flow, share: f32) {
-    for y in 0..attention.height() {
-        let shifts = flow.dx.row(y).iter().zip(flow.dy.row(y)).zip(flow.trust.row(y));
-        for (x, (now, ((dx, dy), trust))) in attention.row_mut(y).iter_mut().zip(shifts).enumerate()
-        {
-            let before = sample(before, x as f32 + dx, y as f32 + dy);
-            *now += share * trust * (before - *now);
-        }
-    }
-}
-
-/// Bilinear value at `(x, y)`, coordinates limited to the image.
-#[inline(always)]
-fn sample(image: &Image<f32>, x: f32, y: f32) -> f32 {
-    let Size { width, height } = image.size();
-    let x = x.clamp(0.0, (width - 1) as f32);
-    let y = y.clamp(0.0, (height - 1) as f32);
-    let (x0, y0) = (x as usize, y as usize);
-    let (fx, fy) = (x - x0 as f32, y - y0 as f32);
-    let pixels = image.pixels();
-    let (right, below) = (usize::from(x0 + 1 < width), usize::from(y0 + 1 < height) * width);
-    let at = y0 * width + x0;
-    let upper = pixels[at] + fx * (pixels[at + right] - pixels[at]);
-    let at = at + below;
-    let lower = pixels[at] + fx * (pixels[at + right] - pixels[at]);
-    upper + fy * (lower - upper)
 }

@@ -2,7 +2,7 @@
 
 use rayon::ThreadPoolBuilder;
 use salient_stereo::camera::{Camera, StereoRig};
-use salient_stereo::config::{Config, SaliencyMode};
+use salient_stereo::config::{Config, SaliencyMode, ThresholdMode};
 use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::View;
 use salient_stereo::simd;
@@ -18,6 +18,7 @@ use salient_stereo::stage::saliency::motion::Motion;
 use salient_stereo::stage::saliency::normalize::normalize;
 use salient_stereo::stage::saliency::orientation::Orientation;
 use salient_stereo::stage::saliency::paper::{LEAST, Paper};
+use salient_stereo::stage::saliency::persistence::Persistence;
 use salient_stereo::stage::saliency::spectral_residual::{SIDE, Spectrum};
 use salient_stereo::stage::saliency::{
     AttentionScene, Cue, Previous, PreviousFrame, Saliency, Scene, shrink_view, upsample,
@@ -92,7 +93,7 @@ impl World {
 
     fn after(mut self, gray: Image<u8>) -> Self {
         let attention = Image::new(gray.size());
-        self.previous = Some(PreviousFrame { stamp: Stamp::default(), gray, attention });
+        self.previous = Some(PreviousFrame { gray, attention, ..PreviousFrame::default() });
         self
     }
 }
@@ -511,6 +512,59 @@ fn smoothing_blends_with_the_past_along_the_flow_and_a_reset_forgets_it() {
     previous.clear();
     let (again, _) = run(&mut stage, &mut previous, &two.left, &two.coarse);
     assert_eq!(again, other, "a reset must forget the frame before");
+}
+
+#[test]
+fn what_was_attended_to_stays_a_little_and_marks_itself() {
+    let size = Size::new(37, 23);
+    let value = |x: usize, y: usize, k: usize| ((x * 31 + y * 17 + k * 7) % 97) as f32 / 97.0;
+    let map = |k: usize| Image::from_fn(size, |x, y| value(x, y, k));
+    let attended = Image::from_fn(size, |x, y| f32::from(u8::from(value(x, y, 3) > 0.6)));
+    let before =
+        PreviousFrame { attention: map(1), attended: attended.clone(), ..PreviousFrame::default() };
+    let config = Config::default();
+    let share = config.saliency.temporal_smoothing;
+    for level in simd::available() {
+        let mut flow = Flow::new(level);
+        flow.dx = Image::from_fn(size, |x, y| 6.0 * value(x, y, 5) - 3.0);
+        flow.dy = Image::from_fn(size, |x, y| 6.0 * value(x, y, 9) - 3.0);
+        flow.trust = map(11);
+        let mut persistence = Persistence::new(&config, level);
+        let (mut out, mut marks) = (map(2), Image::default());
+        persistence.smooth(&mut out, &before, &flow);
+        let (old, past) = (plain::real(&before.attention), plain::real(&attended));
+        let place = |x: usize, y: usize| {
+            let at = (x as f32 + flow.dx.get(x, y), y as f32 + flow.dy.get(x, y));
+            (f64::from(at.0), f64::from(at.1), f64::from(flow.trust.get(x, y)))
+        };
+        let smooth = Image::from_fn(size, |x, y| {
+            let ((u, v, trust), now) = (place(x, y), f64::from(value(x, y, 2)));
+            now + share * trust * (plain::bilinear(&old, u, v) - now)
+        });
+        assert_near(&out, &smooth, 1e-5, "smoothed");
+        persistence.stay(&mut out, &mut marks);
+        let stayed = Image::from_fn(size, |x, y| {
+            let (u, v, trust) = place(x, y);
+            let was = plain::bilinear(&past, u, v);
+            (smooth.get(x, y) + trust * (0.05 * was - 0.02 * (1.0 - was))).clamp(0.0, 1.0)
+        });
+        assert_near(&out, &stayed, 1e-5, "stayed");
+        let expected = out.pixels().iter().map(|s| f32::from(u8::from(*s >= 0.55)));
+        assert!(marks.pixels().iter().copied().eq(expected));
+        // A map that has no frame before it is only marked.
+        let mut first = map(2);
+        persistence.stay(&mut first, &mut marks);
+        assert_eq!(first, map(2));
+        assert!(marks.pixels().contains(&1.0) && marks.pixels().contains(&0.0));
+    }
+    // Nothing is marked where the threshold is not known beforehand, or for the paper's maps.
+    let mut otsu = Config::default();
+    otsu.saliency.threshold_mode = ThresholdMode::Otsu;
+    for config in [otsu, self::config(SaliencyMode::Paper)] {
+        let mut marks = Image::default();
+        Persistence::new(&config, simd::detect()).stay(&mut map(2), &mut marks);
+        assert!(marks.pixels().is_empty());
+    }
 }
 
 #[test]
