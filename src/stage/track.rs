@@ -25,8 +25,9 @@ const LONGEST_GAP: f64 = 5.0;
 /// are at the same distance: in parts, and pixels.
 const SAME_PART: f32 = 0.1;
 const SAME_PX: f32 = 1.0;
-/// Share of a prediction's pixels that must speak for it.
-const LEAST_FOR: f32 = 0.5;
+/// Share of a prediction's pixels that must speak for it: an outline of which less
+/// is left is not that of the thing any more.
+const LEAST_FOR: f32 = 0.8;
 
 /// A track and a region that may be the same thing.
 #[derive(Clone, Copy, Debug)]
@@ -106,8 +107,8 @@ impl Track {
     /// confidence falls to one half over that time. A track that ends without
     /// ever having been active is counted as `unstable`.
     ///
-    /// It is published only where the thing probably still is: at least half of
-    /// its predicted pixels must show in `disparity` (pixels, NaN where there is
+    /// It is published only where the thing probably still is: at least four fifths
+    /// of its predicted pixels must show in `disparity` (pixels, NaN where there is
     /// none) its own distance, outside of the regions of this frame in `labels`,
     /// or something nearer that hides it. What lies behind it, a region at the same
     /// distance (the thing under another identity) and what was not measured

@@ -195,6 +195,28 @@ fn what_is_seen_between_two_things_parts_them() {
 }
 
 #[test]
+fn the_side_of_a_car_that_recedes_is_a_part_of_it() {
+    // Seen from behind: its rear at 8 m, its side beside the axis up to 14 m.
+    let (side, rear, front) = (1.9, 8.0, 14.0);
+    let street = upright(&[[side, 3.5, 0.0, 1.5, rear]]);
+    let car = Image::from_fn(street.size(), |x, y| {
+        let (u, v) = standing::centre(x, y);
+        let z = F * side / (f64::from(u) - 320.0);
+        let height = HEIGHT - (f64::from(v) - HORIZON) * z / F;
+        if !(rear..front).contains(&z) || !(0.0..1.5).contains(&height) {
+            return street.get(x, y);
+        }
+        // Disparity falls in steps: by too much here, by too little there.
+        let wrong = if x % 4 < 2 { 0.13 } else { -0.13 };
+        (F * BASELINE / z) as f32 + wrong
+    });
+    let things = things(&car);
+    assert_eq!(things.list.len(), 1, "{:?}", things.list);
+    let [near, far] = things.list[0].depth_m;
+    assert!(near < rear as f32 + 0.2 && far > front as f32 - 0.7, "{near} {far}");
+}
+
+#[test]
 fn what_stands_is_found_and_what_floats_is_counted() {
     // A car, a pole, and a sign board that nothing carries, far apart.
     let boxes =

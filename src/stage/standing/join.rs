@@ -220,8 +220,7 @@ impl View {
             // columns approach the centre; nothing that is visible recedes faster.
             let (us, ut) = (self.offset(s), self.offset(t));
             if us * ut > 0.0 && (us.abs() < ut.abs()) == (zs > zt) {
-                let receding = near * ((us / ut).max(ut / us) - 1.0);
-                step = step.max(1.2 * receding + 0.5 * noise);
+                step += near * ((us / ut).max(ut / us) - 1.0);
             }
         }
         far - near <= step
