@@ -4,9 +4,9 @@
 #   benches/evaluate.sh DATA [OPTION…]
 #
 # DATA holds whatever there is of the published folders, as
-#   kitti2012/  kitti2015/  middlebury*/  sintel/  spring/  davis/  duts/DUTS-TR/
+#   kitti2012/  kitti2015/  middlebury*/  sintel/  spring/  davis/  duts/DUTS-TR/  video_masks/
 # and our own bags are always measured. OPTIONs go to `salient_stereo evaluate` (--threads 1, --set …).
-# OpenCV's rows and the matcher's table need a Python with opencv-python-headless, numpy, mcap and mcap-ros2-support:
+# OpenCV's rows, the matcher's table and that of the clips need a Python with opencv-python-headless, numpy, mcap and mcap-ros2-support:
 # set PYTHON; without it they are left out.
 # Finished scenes are kept in out/evaluation: run it again after an interruption. Exit code 3: everything was
 # written, and scenes that could not be read are named above.
@@ -36,13 +36,17 @@ add bag bags/tabletop.mcap
 
 peers=()
 scenes=()
+clips=()
 if [ -n "${PYTHON:-}" ]; then
     [ -d "$data/kitti2012/training/disp_noc" ] && scenes+=("$data/kitti2012")
     [ -d "$data/kitti2015/training/disp_noc_0" ] && scenes+=("$data/kitti2015")
     while read -r image; do scenes+=("$(dirname "$image")"); done < <(
         find -L "$data"/middlebury*/ -name mask0nocc.png -o -name groundtruth.png -o -name disp1.png -o -name '*GT.png' | sort)
+    [ -d "$data/davis/Annotations" ] && clips+=("$data/davis")
+    [ -d "$data/video_masks" ] && clips+=("$data/video_masks")
     mkdir -p out
 fi
+[ ${#clips[@]} -gt 0 ] && "$PYTHON" benches/clips.py "$tool" "${clips[@]}" --readme README.md >/dev/null
 if [ ${#scenes[@]} -gt 0 ]; then
     "$PYTHON" benches/peers/stereo.py "${scenes[@]}" --tool "$tool" --readme README.md --json out/peers.json >out/peers.md
     peers=(--peers out/peers.json)
