@@ -2,9 +2,11 @@
 
 pub mod column;
 pub mod join;
+pub mod kinds;
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
+use crate::simd::Level;
 use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
 use column::{Columns, Segment, Top};
@@ -57,6 +59,40 @@ pub struct Thing {
     narrow: bool,
 }
 
+impl Thing {
+    /// Left to right and near to far, metres.
+    fn size_m(&self) -> [f32; 2] {
+        [self.lateral_m, self.depth_m].map(|[from, to]| to - from)
+    }
+
+    fn part(&self, columns: u32) -> f32 {
+        columns as f32 / self.columns as f32
+    }
+
+    fn is_large(&self, scale: f32, least_cells: u32) -> bool {
+        let low = (LEAST_TOP_M * scale).max(LEAST_RISE * self.size_m()[0]);
+        self.cells >= least_cells && self.top_m >= low
+    }
+
+    fn stands(&self) -> bool {
+        self.part(self.contacts) >= LEAST_CONTACT
+    }
+
+    fn is_narrow(&self) -> bool {
+        let [width, depth] = self.size_m();
+        width.max(depth) <= TRUNK_M
+    }
+
+    fn is_building(&self) -> bool {
+        !self.is_narrow() && self.part(self.tall + self.covered) > MOST_TALL
+    }
+
+    fn is_behind(&self) -> bool {
+        let sides = (self.free + self.hidden).max(1) as f32;
+        (self.free as f32) < LEAST_FREE * sides
+    }
+}
+
 /// The things of a frame and where they are.
 #[derive(Debug, Default)]
 pub struct Things {
@@ -74,7 +110,7 @@ pub struct Things {
 }
 
 /// The finder of things that stand, with its buffers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Standing {
     columns: Columns,
     join: Join,
@@ -85,6 +121,18 @@ pub struct Standing {
 }
 
 impl Standing {
+    /// The finder with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self {
+            columns: Columns::new(level),
+            join: Join::default(),
+            thing: Vec::new(),
+            rows: Vec::new(),
+            seen: Vec::new(),
+            limits: Vec::new(),
+        }
+    }
+
     /// Things in a map of disparity per cell of [`WIDE`] x [`HIGH`] pixels (full-size pixels, `cx_l - cx_r`
     /// subtracted, NaN where there is none) on `plane`.
     pub fn run(
@@ -139,28 +187,19 @@ impl Standing {
             t.lateral_m[1] = t.lateral_m[1].max(left + WIDE as f32 * z / focal);
             t.top_m = t.top_m.max(s.top_m);
             t.depth_m = [t.depth_m[0].min(z), t.depth_m[1].max(z)];
-            let [free, hidden] = sides(disparity, s);
-            t.free += free;
-            t.hidden += hidden;
         }
+        self.look_aside(disparity, scale, least_cells, &mut out.list);
         // Things that are none get the number 0, the others new ones.
         self.seen.clear();
         let mut kept = 0;
         for i in 0..out.list.len() {
             let thing = out.list[i];
-            let part = |n: u32| n as f32 / thing.columns as f32;
-            let stands = part(thing.contacts) >= LEAST_CONTACT;
-            let [width, depth] = [thing.lateral_m, thing.depth_m].map(|[from, to]| to - from);
-            let low = (LEAST_TOP_M * scale).max(LEAST_RISE * width);
-            let large = thing.cells >= least_cells && thing.top_m >= low;
-            let narrow = width.max(depth) <= TRUNK_M;
-            let building = !narrow && part(thing.tall + thing.covered) > MOST_TALL;
-            let sides = (thing.free + thing.hidden).max(1) as f32;
-            let behind = (thing.free as f32) < LEAST_FREE * sides;
+            let (large, stands) = (thing.is_large(scale, least_cells), thing.stands());
+            let background = thing.is_building() || thing.is_behind();
             out.floating += u32::from(large && !stands);
-            out.background += u32::from(large && stands && (building || behind));
-            if large && stands && !building && !behind {
-                out.list[kept] = Thing { narrow, ..thing };
+            out.background += u32::from(large && stands && background);
+            if large && stands && !background {
+                out.list[kept] = Thing { narrow: thing.is_narrow(), ..thing };
                 kept += 1;
                 self.seen.push(kept as u32);
             } else {
@@ -173,13 +212,35 @@ impl Standing {
         }
     }
 
+    /// Counts what is at the sides of things that may be background for that alone.
+    fn look_aside(
+        &mut self,
+        disparity: &Image<f32>,
+        scale: f32,
+        least_cells: u32,
+        things: &mut [Thing],
+    ) {
+        self.seen.clear();
+        self.seen.extend(things.iter().map(|thing| {
+            let asked = thing.is_large(scale, least_cells) && thing.stands();
+            u32::from(asked && !thing.is_building())
+        }));
+        for (s, &thing) in self.columns.segments.iter().zip(&self.thing) {
+            let index = thing as usize - 1;
+            if self.seen[index] != 0 {
+                let [free, hidden] = sides(disparity, s);
+                things[index].free += free;
+                things[index].hidden += hidden;
+            }
+        }
+    }
+
     /// Writes the cells of each thing, less its outermost ones.
     fn paint(&mut self, disparity: &Image<f32>, out: &mut Things) {
         let size = disparity.size();
         out.ids.resize(size);
         out.ids.fill(0);
         out.surface.resize(size);
-        out.surface.fill(f32::NAN);
         self.rows.clear();
         self.rows.resize(size.height * out.list.len(), 0);
         for (s, &thing) in self.columns.segments.iter().zip(&self.thing).filter(|(_, t)| **t != 0) {

@@ -176,7 +176,7 @@ fn things(disparity: &Image<f32>) -> Things {
     ground.run(&street(0.0, &[]), &rig);
     let plane = *ground.plane().expect("a street has a ground");
     let mut things = Things::default();
-    Standing::default().run(disparity, &plane, &rig, 4, &mut things);
+    Standing::new(simd::detect()).run(disparity, &plane, &rig, 4, &mut things);
     things
 }
 

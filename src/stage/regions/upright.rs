@@ -36,7 +36,7 @@ impl Upright {
     pub fn new(level: Level) -> Self {
         Self {
             level,
-            standing: Standing::default(),
+            standing: Standing::new(level),
             things: Things::default(),
             painter: Painter::new(level),
             cells: Image::default(),

@@ -218,6 +218,33 @@ fn compare_row<S: Simd>(simd: S, values: &[f32], threshold: f32, words: &mut [u6
     }
 }
 
+/// Whether bit `at` of some words is set.
+pub fn is_set(words: &[u64], at: usize) -> bool {
+    words[at / WORD] >> (at % WORD) & 1 == 1
+}
+
+/// The first set bit from bit `from` on.
+pub fn first_set(words: &[u64], from: usize) -> Option<usize> {
+    let mut index = from / WORD;
+    let mut word = words.get(index)? & (u64::MAX << (from % WORD));
+    while word == 0 {
+        index += 1;
+        word = *words.get(index)?;
+    }
+    Some(index * WORD + word.trailing_zeros() as usize)
+}
+
+/// The last set bit before bit `to`.
+pub fn last_set(words: &[u64], to: usize) -> Option<usize> {
+    let mut index = to / WORD;
+    let mut word = words.get(index).map_or(0, |word| word & !(u64::MAX << (to % WORD)));
+    while word == 0 {
+        index = index.checked_sub(1)?;
+        word = words[index];
+    }
+    Some(index * WORD + WORD - 1 - word.leading_zeros() as usize)
+}
+
 /// For each byte eight pixels: 255 where its bit is set.
 const SPREAD: [u64; 256] = {
     let mut table = [0; 256];
@@ -234,3 +261,20 @@ const SPREAD: [u64; 256] = {
     }
     table
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_found_across_words() {
+        let words = [1 << 63, 0, 1 << 5];
+        assert_eq!(first_set(&words, 0), Some(63));
+        assert_eq!(first_set(&words, 64), Some(133));
+        assert_eq!(first_set(&words, 134), None);
+        assert_eq!(last_set(&words, 192), Some(133));
+        assert_eq!(last_set(&words, 133), Some(63));
+        assert_eq!(last_set(&words, 63), None);
+        assert!(is_set(&words, 133) && !is_set(&words, 132));
+    }
+}

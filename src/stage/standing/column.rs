@@ -1,18 +1,15 @@
 //! Segments of a column of cells that are one surface above the ground.
 
+use super::centre;
+use super::kinds::{Bits, HIGH_M, Kinds};
 use crate::image::Image;
+use crate::simd::Level;
 use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
-use crate::stage::standing::centre;
+use crate::stage::roi::bits::{first_set, is_set, last_set};
 
-/// Height in metres (of a road scene) from which a cell is above the ground.
-const LOW_M: f32 = 0.2;
-/// Uncertainty of a cell's disparity in pixels; it lifts the lower limit far away.
-const NOISE_PX: f32 = 0.4;
 /// A segment that begins no higher than this stands on the ground, metres.
 const CONTACT_M: f32 = 0.6;
-/// Height up to which surfaces are joined: the crowns of trees begin there, metres.
-const HIGH_M: f32 = 2.6;
 /// A surface that reaches higher than a lorry is part of a building, a tree or a pole.
 const TALL_M: f32 = 4.2;
 /// Cells without disparity that a segment may span.
@@ -23,8 +20,6 @@ const LOOK_UP: usize = 6;
 const SEGMENT_PART: f32 = 0.12;
 /// Largest difference in disparity of a thing's foot from the thing, in parts.
 const FOOT_PART: f32 = 0.08;
-/// Disparity in pixels below which heights are noise.
-const LEAST_DISPARITY: f32 = 1.2;
 
 /// What is above the upper end of a segment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,8 +67,10 @@ impl Segment {
 }
 
 /// The segments of every column, from left to right, in a column upward.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Columns {
+    level: Level,
+    kinds: Kinds,
     /// All segments.
     pub segments: Vec<Segment>,
     /// Index of the first segment of each column, and the number of all.
@@ -81,101 +78,28 @@ pub struct Columns {
 }
 
 impl Columns {
+    /// The finder with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self { level, kinds: Kinds::default(), segments: Vec::new(), first: Vec::new() }
+    }
+
     /// Upward through every column: cells above the ground whose disparities agree.
     pub fn find(&mut self, disparity: &Image<f32>, plane: &Plane) {
         self.segments.clear();
         self.first.clear();
+        self.kinds.find(self.level, disparity, plane);
+        let contact_m = CONTACT_M * super::size_scale(plane);
         for x in 0..disparity.width() {
             self.first.push(self.segments.len() as u32);
-            self.climb(x, disparity, plane);
+            let column = Column::new(x, disparity, plane, &self.kinds);
+            column.climb(contact_m, &mut self.segments);
         }
         self.first.push(self.segments.len() as u32);
         self.ground(disparity, plane);
     }
 
-    fn climb(&mut self, x: usize, disparity: &Image<f32>, plane: &Plane) {
-        let scale = super::size_scale(plane);
-        let mut open: Option<Segment> = None;
-        // Cells without disparity since the last one with.
-        let mut holes = 0;
-        // What the segment above stands on or is hidden by.
-        let mut carried = true;
-        for y in (0..disparity.height()).rev() {
-            let d = disparity.get(x, y);
-            if d.is_nan() || d <= LEAST_DISPARITY {
-                holes += 1;
-                continue;
-            }
-            let gap = holes;
-            holes = 0;
-            let (u, v) = centre(x, y);
-            let height = plane.height(u, v, d);
-            if let Some(s) = &mut open {
-                let near = (d - s.disparity()).abs() <= SEGMENT_PART * s.disparity();
-                if gap <= MAX_HOLES && near && agree(d, s.last) {
-                    s.last = d;
-                    s.reach = y as u32;
-                    if height <= HIGH_M {
-                        s.upper = y as u32;
-                        s.cells += 1;
-                        s.sum += d;
-                        s.top_m = s.top_m.max(height);
-                    } else if height > TALL_M {
-                        s.top = Top::Tall;
-                    }
-                    continue;
-                }
-                let mut s = *s;
-                if s.top != Top::Tall && gap <= LOOK_UP && !agree(d, s.last) {
-                    // Nothing ends at this height by chance: a step in a wall.
-                    if plane.height(u, v, s.last) > HIGH_M
-                        && s.reach == s.upper
-                        && s.upper == y as u32 + 1
-                    {
-                        s.top = Top::Tall;
-                    } else if d > s.last {
-                        s.top = Top::Covered;
-                    }
-                }
-                carried = gap <= MAX_HOLES && d < s.disparity();
-                self.segments.push(s);
-                open = None;
-            } else if gap > MAX_HOLES {
-                carried = false;
-            }
-            let low = LOW_M * scale + NOISE_PX * plane.camera_height_m / d;
-            if height < low || height > HIGH_M {
-                // Directly above a cell of the ground, something stands on it.
-                carried = height < low;
-                continue;
-            }
-            open = Some(Segment {
-                x: x as u32,
-                upper: y as u32,
-                lower: y as u32 + 1,
-                reach: y as u32,
-                cells: 1,
-                sum: d,
-                last: d,
-                bottom_m: height,
-                top_m: height,
-                contact: carried || height <= CONTACT_M * scale,
-                top: Top::Free,
-            });
-            // It carries one segment only.
-            carried = false;
-        }
-        if let Some(mut s) = open {
-            // At the edge of the image nobody knows how far up it goes.
-            if s.top == Top::Free && holes == 0 {
-                s.top = Top::Tall;
-            }
-            self.segments.push(s);
-        }
-    }
-
     /// Down from a segment to where the ground has its disparity: what is lower
-    /// than [`LOW_M`] was no evidence of a thing, but belongs to one.
+    /// than [`super::kinds::LOW_M`] was no evidence of a thing, but belongs to one.
     fn ground(&mut self, disparity: &Image<f32>, plane: &Plane) {
         for s in self.segments.iter_mut().filter(|s| s.contact) {
             let mean = s.disparity();
@@ -190,6 +114,113 @@ impl Columns {
                 s.lower = y as u32 + 1;
                 s.sum += mean;
                 s.cells += 1;
+            }
+        }
+    }
+}
+
+/// One column of cells.
+struct Column<'a> {
+    x: usize,
+    disparity: &'a Image<f32>,
+    heights: &'a Image<f32>,
+    plane: &'a Plane,
+    bits: Bits<'a>,
+}
+
+impl<'a> Column<'a> {
+    fn new(x: usize, disparity: &'a Image<f32>, plane: &'a Plane, kinds: &'a Kinds) -> Self {
+        Self { x, disparity, heights: &kinds.heights, plane, bits: kinds.column(x) }
+    }
+
+    fn climb(&self, contact_m: f32, out: &mut Vec<Segment>) {
+        let height = self.disparity.height();
+        let mut next = last_set(self.bits.evidence, height);
+        while let Some(mut y) = next {
+            // Directly above a cell of the ground, something stands on it.
+            let below = first_set(self.bits.known, y + 1);
+            let gap = below.unwrap_or(height) - y - 1;
+            let ground = below.is_none_or(|below| is_set(self.bits.ground, below));
+            let mut carried = gap <= MAX_HOLES && ground;
+            next = loop {
+                let mut s = self.start(y, contact_m, carried);
+                let end = self.grow(&mut s);
+                out.push(s);
+                let Some((above, gap)) = end else { break None };
+                if !is_set(self.bits.evidence, above) {
+                    break last_set(self.bits.evidence, above);
+                }
+                // What is farther away stands on this one or is hidden by it.
+                carried = gap <= MAX_HOLES && self.disparity.get(self.x, above) < s.disparity();
+                y = above;
+            };
+        }
+    }
+
+    /// A segment of one cell.
+    fn start(&self, y: usize, contact_m: f32, carried: bool) -> Segment {
+        let (d, height) = (self.disparity.get(self.x, y), self.heights.get(self.x, y));
+        Segment {
+            x: self.x as u32,
+            upper: y as u32,
+            lower: y as u32 + 1,
+            reach: y as u32,
+            cells: 1,
+            sum: d,
+            last: d,
+            bottom_m: height,
+            top_m: height,
+            contact: carried || height <= contact_m,
+            top: Top::Free,
+        }
+    }
+
+    /// Upward from a segment's first cell as far as the surface goes. What is
+    /// above: a cell with disparity, and the number of those without between.
+    fn grow(&self, s: &mut Segment) -> Option<(usize, usize)> {
+        let (mut y, mut mean) = (s.upper as usize, s.disparity());
+        while let Some(above) = last_set(self.bits.known, y) {
+            let gap = y - above - 1;
+            let d = self.disparity.get(self.x, above);
+            let near = (d - mean).abs() <= SEGMENT_PART * mean;
+            if !(gap <= MAX_HOLES && near && agree(d, s.last)) {
+                self.end(s, above, gap);
+                return Some((above, gap));
+            }
+            let height = self.heights.get(self.x, above);
+            s.last = d;
+            s.reach = above as u32;
+            if height <= HIGH_M {
+                s.upper = above as u32;
+                s.cells += 1;
+                s.sum += d;
+                s.top_m = s.top_m.max(height);
+                mean = s.disparity();
+            } else if height > TALL_M {
+                s.top = Top::Tall;
+            }
+            y = above;
+        }
+        // At the edge of the image nobody knows how far up it goes.
+        if s.top == Top::Free && y == 0 {
+            s.top = Top::Tall;
+        }
+        None
+    }
+
+    /// What the cell `above`, which is of something else, tells about a segment's top.
+    fn end(&self, s: &mut Segment, above: usize, gap: usize) {
+        let d = self.disparity.get(self.x, above);
+        if s.top != Top::Tall && gap <= LOOK_UP && !agree(d, s.last) {
+            let (u, v) = centre(self.x, above);
+            // Nothing ends at this height by chance: a step in a wall.
+            if self.plane.height(u, v, s.last) > HIGH_M
+                && s.reach == s.upper
+                && s.upper == above as u32 + 1
+            {
+                s.top = Top::Tall;
+            } else if d > s.last {
+                s.top = Top::Covered;
             }
         }
     }

@@ -37,6 +37,9 @@ pub struct Join {
     sets: UnionFind,
     places: Vec<Place>,
     strong: Vec<bool>,
+    /// The strong ones by themselves, and the index of the first of each column.
+    strong_places: Vec<Place>,
+    first_strong: Vec<u32>,
     widths: Vec<u32>,
     links: Vec<u64>,
 }
@@ -48,15 +51,26 @@ impl Join {
     /// pieces are short: they take a thing, but never make one of two.
     pub fn run(&mut self, disparity: &Image<f32>, columns: &Columns, scale: f32, rig: &StereoRig) {
         let view = View::new(scale, rig);
+        let Columns { segments, first, .. } = columns;
         self.places.clear();
-        self.places.extend(columns.segments.iter().map(|s| view.place(s)));
+        self.places.extend((0..).zip(segments).map(|(i, s)| view.place(i, s)));
         self.strong.clear();
         let least = STRONG_M * scale;
-        self.strong.extend(columns.segments.iter().zip(&self.places).map(|(s, place)| {
-            let rows = (s.lower - s.upper) as f32 * HIGH as f32;
+        self.strong.extend(self.places.iter().map(|place| {
+            let rows = (place.lower - place.upper) as f32 * HIGH as f32;
             rows * place.distance >= least * view.focal
         }));
-        self.sets.reset(columns.segments.len());
+        self.strong_places.clear();
+        self.first_strong.clear();
+        for column in first.windows(2) {
+            self.first_strong.push(self.strong_places.len() as u32);
+            let column = column[0] as usize..column[1] as usize;
+            let strong = self.places[column.clone()].iter().zip(&self.strong[column]);
+            self.strong_places
+                .extend(strong.filter(|(_, strong)| **strong).map(|(place, _)| place));
+        }
+        self.first_strong.push(self.strong_places.len() as u32);
+        self.sets.reset(segments.len());
         self.beside(disparity, columns, &view);
         self.above(columns, &view);
         self.attach(columns, &view);
@@ -64,22 +78,22 @@ impl Join {
 
     /// Strong segments side by side with nothing seen through between them.
     fn beside(&mut self, disparity: &Image<f32>, columns: &Columns, view: &View) {
-        let Columns { segments, first } = columns;
-        for (i, place) in self.places.iter().enumerate().filter(|(i, _)| self.strong[*i]) {
+        for place in &self.strong_places {
             let column = place.x as usize;
             let reach = view.columns(GAP_M, place);
             let mut looked = 0;
             for x in (column.saturating_sub(reach)..column).rev() {
-                let others = first[x] as usize..first[x + 1] as usize;
+                let others = self.first_strong[x] as usize..self.first_strong[x + 1] as usize;
                 let mut joined = false;
-                for (j, other) in others.clone().zip(&self.places[others]) {
-                    if self.strong[j] && view.beside(place, other) {
-                        self.sets.union(j as u32, i as u32);
+                for other in &self.strong_places[others] {
+                    if view.beside(place, other) {
+                        self.sets.union(other.segment, place.segment);
                         joined = true;
                     }
                 }
                 looked += usize::from(joined);
-                if looked == ENOUGH || (!joined && seen_through(disparity, x, &segments[i])) {
+                let s = &columns.segments[place.segment as usize];
+                if looked == ENOUGH || (!joined && seen_through(disparity, x, s)) {
                     break;
                 }
             }
@@ -88,7 +102,7 @@ impl Join {
 
     /// Sets of strong segments of which one stands on the other along most of its width.
     fn above(&mut self, columns: &Columns, view: &View) {
-        let Columns { segments, first } = columns;
+        let Columns { segments, first, .. } = columns;
         self.widths.clear();
         self.widths.resize(segments.len(), 0);
         self.links.clear();
@@ -99,7 +113,7 @@ impl Join {
                 let set = self.sets.find(i as u32);
                 self.widths[set as usize] += 1;
                 if let Some(j) = below
-                    && view.above(&segments[j], &segments[i])
+                    && view.above((&segments[j], &self.places[j]), (&segments[i], &self.places[i]))
                 {
                     let other = self.sets.find(j as u32);
                     if other != set {
@@ -122,7 +136,7 @@ impl Join {
 
     /// The other segments: each to the neighbour nearest in depth.
     fn attach(&mut self, columns: &Columns, view: &View) {
-        let Columns { segments, first } = columns;
+        let Columns { segments, first, .. } = columns;
         for (i, s) in segments.iter().enumerate().filter(|(i, _)| !self.strong[*i]) {
             let column = s.x as usize;
             let mut best = (f32::INFINITY, None);
@@ -135,7 +149,7 @@ impl Join {
                     continue;
                 }
                 let touches = if t.x == s.x {
-                    view.above(s, t) || view.above(t, s)
+                    view.above((s, place), (t, other)) || view.above((t, other), (s, place))
                 } else {
                     view.beside(place, other)
                 };
@@ -166,6 +180,7 @@ fn seen_through(disparity: &Image<f32>, x: usize, s: &Segment) -> bool {
 /// Where a segment is.
 #[derive(Clone, Copy, Debug)]
 struct Place {
+    segment: u32,
     x: u32,
     upper: u32,
     lower: u32,
@@ -191,13 +206,9 @@ impl View {
         }
     }
 
-    /// Along the optical axis, metres.
-    fn distance(&self, s: &Segment) -> f32 {
-        self.depth_scale / s.disparity()
-    }
-
-    fn place(&self, s: &Segment) -> Place {
-        Place { x: s.x, upper: s.upper, lower: s.lower, distance: self.distance(s) }
+    fn place(&self, segment: u32, s: &Segment) -> Place {
+        let distance = self.depth_scale / s.disparity();
+        Place { segment, x: s.x, upper: s.upper, lower: s.lower, distance }
     }
 
     /// Columns of cells across `length_m` metres of a road scene at a segment, and four pixels.
@@ -212,18 +223,21 @@ impl View {
         }
         let (zs, zt) = (s.distance, t.distance);
         let (near, far) = (zs.min(zt), zs.max(zt));
-        // d Z = Z² / (f B) d d
-        let noise = STEP_PX * far * far / self.depth_scale;
-        let mut step = (STEP_M * self.scale).max(STEP_PART * far).max(noise);
-        if s.x.abs_diff(t.x) == 1 {
-            // A surface parallel to the axis recedes by as much as its
-            // columns approach the centre; nothing that is visible recedes faster.
-            let (us, ut) = (self.offset(s), self.offset(t));
-            if us * ut > 0.0 && (us.abs() < ut.abs()) == (zs > zt) {
-                step += near * ((us / ut).max(ut / us) - 1.0);
-            }
+        let step = far - near;
+        let most = (STEP_M * self.scale).max(STEP_PART * far);
+        if step <= most {
+            return true;
         }
-        far - near <= step
+        // d Z = Z² / (f B) d d
+        let most = most.max(STEP_PX * far * far / self.depth_scale);
+        if step <= most || s.x.abs_diff(t.x) != 1 {
+            return step <= most;
+        }
+        // A surface parallel to the axis recedes by as much as its
+        // columns approach the centre; nothing that is visible recedes faster.
+        let (us, ut) = (self.offset(s), self.offset(t));
+        let recedes = us * ut > 0.0 && (us.abs() < ut.abs()) == (zs > zt);
+        recedes && step <= most + near * ((us / ut).max(ut / us) - 1.0)
     }
 
     /// Columns from the principal point, pixels.
@@ -232,8 +246,9 @@ impl View {
     }
 
     /// Whether `upper` is a part of what `lower` is of, in the same column.
-    fn above(&self, lower: &Segment, upper: &Segment) -> bool {
-        let setback = self.distance(upper) - self.distance(lower);
+    fn above(&self, lower: (&Segment, &Place), upper: (&Segment, &Place)) -> bool {
+        let setback = upper.1.distance - lower.1.distance;
+        let (lower, upper) = (lower.0, upper.0);
         let near = lower.upper.abs_diff(upper.lower) as usize <= MAX_HOLES;
         // A surface that only leans back rises on the way; what begins lower
         // than the edge in front of it is something else behind it.

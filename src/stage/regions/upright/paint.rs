@@ -9,7 +9,7 @@ use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u8x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::components::{Candidates, PixelBox, tolerance};
-use crate::stage::roi::bits::BitMask;
+use crate::stage::roi::bits::{BitMask, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};
 
 /// Largest difference of a pixel from its surface in parts of the disparity.
@@ -281,28 +281,6 @@ fn enclose(ids: &[u32], fine: &[u64], holes: &mut [u8]) {
     }
 }
 
-/// The first set bit from bit `from` on.
-fn first_set(words: &[u64], from: usize) -> Option<usize> {
-    let mut index = from / 64;
-    let mut word = words.get(index)? & (u64::MAX << (from % 64));
-    while word == 0 {
-        index += 1;
-        word = *words.get(index)?;
-    }
-    Some(index * 64 + word.trailing_zeros() as usize)
-}
-
-/// The last set bit before bit `to`.
-fn last_set(words: &[u64], to: usize) -> Option<usize> {
-    let mut index = to / 64;
-    let mut word = words.get(index).map_or(0, |word| word & !(u64::MAX << (to % 64)));
-    while word == 0 {
-        index = index.checked_sub(1)?;
-        word = words[index];
-    }
-    Some(index * 64 + 63 - word.leading_zeros() as usize)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -316,17 +294,6 @@ mod tests {
         enclose(&ids, &fine, &mut holes);
         let expected = [INSIDE, INSIDE, INSIDE, INSIDE, OWN, OWN, OWN, OWN, OUTSIDE];
         assert_eq!(holes.as_chunks::<WIDE>().0, expected.map(|hole| [hole; WIDE]));
-    }
-
-    #[test]
-    fn bits_are_found_across_words() {
-        let words = [1 << 63, 0, 1 << 5];
-        assert_eq!(first_set(&words, 0), Some(63));
-        assert_eq!(first_set(&words, 64), Some(133));
-        assert_eq!(first_set(&words, 134), None);
-        assert_eq!(last_set(&words, 192), Some(133));
-        assert_eq!(last_set(&words, 133), Some(63));
-        assert_eq!(last_set(&words, 63), None);
     }
 
     #[test]
