@@ -11,36 +11,44 @@
 )]
 
 use crate::image::{Image, Size};
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, prelude::*, u8x64, u32x16};
 
 /// Channels that are computed side by side: Y, Cb, Cr and disparity.
 const CHANNELS: usize = 4;
 /// Rows that are computed side by side.
-const ROWS: usize = 8;
+const ROWS: usize = 16;
 /// Bytes of a step: one cell of each row.
 const LANES: usize = ROWS * CHANNELS;
-/// Bytes of a step in memory: with the row above and the one below.
-const STRIDE: usize = LANES + 2 * CHANNELS;
 /// Raster scans: forward, backward, forward.
 const PASSES: usize = 3;
+
+/// The cells of a step, in bytes; four of them are a cell.
+type Step = [u8; LANES];
 
 /// Barrier distances of colours and of a fourth channel.
 ///
 /// In a raster scan a cell depends on two of its neighbours, so that neither
 /// rows nor columns can be computed side by side, but what lies on a diagonal
 /// can (a wavefront). Bands of [`ROWS`] rows are therefore stored askew: step
-/// `t` of a band holds, row after row, the cells `(t − 1 − r, r)`. In a step the
-/// neighbours to the left and above are at the step before, those to the right
-/// and below at the step after, each as one run of bytes.
+/// `t` of a band holds, row after row, the cells `(t − r, r)`. Of a step the
+/// neighbours to the left are the step before, those above the same one row
+/// further down; to the right and below it is the step after.
 #[derive(Debug)]
 pub struct Barrier {
     level: Level,
+    size: Size,
     /// The cells' values; those of the best path to each, the largest and the
     /// smallest; and their difference.
-    value: Vec<u8>,
-    high: Vec<u8>,
-    low: Vec<u8>,
-    span: Vec<u8>,
+    value: Vec<Step>,
+    high: Vec<Step>,
+    low: Vec<Step>,
+    span: Vec<Step>,
+    /// What cells begin with, for images of `size`: 255 where there is none, and
+    /// the barrier.
+    outside: Vec<Step>,
+    first: Vec<Step>,
+    /// One row of cells.
+    row: Vec<u32>,
 }
 
 /// The colour in ITU-R BT.601 YCbCr, full range.
@@ -57,7 +65,17 @@ pub fn ycbcr([r, g, b]: [u8; 3]) -> [u8; 3] {
 impl Barrier {
     /// The distance at this SIMD level.
     pub fn new(level: Level) -> Self {
-        Self { level, value: Vec::new(), high: Vec::new(), low: Vec::new(), span: Vec::new() }
+        Self {
+            level,
+            size: Size::default(),
+            value: Vec::new(),
+            high: Vec::new(),
+            low: Vec::new(),
+            span: Vec::new(),
+            outside: Vec::new(),
+            first: Vec::new(),
+            row: Vec::new(),
+        }
     }
 
     /// Fills `color` with the sum of the barriers of Y, Cb and Cr (0..=765)
@@ -72,146 +90,169 @@ impl Barrier {
         let size = rgb.size();
         color.resize(size);
         extra.resize(size);
-        let bands = Bands { width: size.width, steps: size.width + ROWS + 1 };
-        self.take(rgb, fourth, bands);
-        let count = size.height.div_ceil(ROWS);
-        for pass in 0..PASSES {
-            for i in 0..count {
-                let band = if pass % 2 == 0 { i } else { count - 1 - i };
-                self.scan(bands, band, pass % 2 == 0);
-                // The next band needs the last row of this one, or the first.
-                if i + 1 < count && pass % 2 == 0 {
-                    self.hand_on(bands, (band, ROWS), (band + 1, 0));
-                } else if i + 1 < count {
-                    self.hand_on(bands, (band, 1), (band - 1, ROWS + 1));
+        if self.size != size {
+            self.fit(size);
+        }
+        let bands = self.bands();
+        dispatch!(self.level, simd => {
+            self.take(rgb, fourth);
+            for pass in 0..PASSES {
+                for i in 0..bands {
+                    match pass {
+                        0 => self.scan::<_, true, true>(simd, i),
+                        1 => self.scan::<_, false, false>(simd, bands - 1 - i),
+                        _ => self.scan::<_, true, false>(simd, i),
+                    }
                 }
             }
-        }
-        for y in 0..size.height {
-            let cells = color.row_mut(y).iter_mut().zip(extra.row_mut(y));
-            for (x, (color, extra)) in cells.enumerate() {
-                let at = bands.place(y / ROWS, y % ROWS + 1, x);
-                let [y, cb, cr, fourth] = four(&self.span, at);
-                *color = f32::from(u16::from(y) + u16::from(cb) + u16::from(cr));
-                *extra = f32::from(fourth);
-            }
-        }
-    }
-
-    /// Writes the values askew. Beyond the image a cell is one that no path
-    /// leads to or through: its barrier is 0, so that none is better, and it
-    /// spans all values, so that what leads through it has a barrier of 255.
-    fn take(&mut self, rgb: &Image<[u8; 3]>, fourth: &Image<u8>, bands: Bands) {
-        let Size { width, height } = rgb.size();
-        let bytes = height.div_ceil(ROWS) * bands.steps * STRIDE;
-        for (buffer, outside) in [
-            (&mut self.value, 0),
-            (&mut self.high, u8::MAX),
-            (&mut self.low, 0),
-            (&mut self.span, 0),
-        ] {
-            buffer.clear();
-            buffer.resize(bytes, outside);
-        }
-        for y in 0..height {
-            let cells = rgb.row(y).iter().zip(fourth.row(y));
-            for (x, (&rgb, &fourth)) in cells.enumerate() {
-                let [luma, cb, cr] = ycbcr(rgb);
-                let value = [luma, cb, cr, fourth];
-                let border = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
-                let at = bands.place(y / ROWS, y % ROWS + 1, x);
-                for buffer in [&mut self.value, &mut self.high, &mut self.low] {
-                    buffer[at..at + CHANNELS].copy_from_slice(&value);
-                }
-                self.span[at..at + CHANNELS].fill(if border { 0 } else { u8::MAX });
-            }
-        }
-    }
-
-    /// Copies the paths of a slot of one band into a slot of another.
-    fn hand_on(&mut self, bands: Bands, from: (usize, usize), to: (usize, usize)) {
-        for x in 0..bands.width {
-            let (from, to) = (bands.place(from.0, from.1, x), bands.place(to.0, to.1, x));
-            for buffer in [&mut self.high, &mut self.low] {
-                buffer.copy_within(from..from + CHANNELS, to);
-            }
-        }
-    }
-
-    /// One scan over a band.
-    fn scan(&mut self, bands: Bands, band: usize, forward: bool) {
-        let bytes = band * bands.steps * STRIDE..(band + 1) * bands.steps * STRIDE;
-        let value = &self.value[bytes.clone()];
-        let (high, low) = (&mut self.high[bytes.clone()], &mut self.low[bytes.clone()]);
-        let span = &mut self.span[bytes];
-        dispatch!(self.level, _simd => {
-            if forward {
-                for step in 1..bands.steps {
-                    let before = (step - 1) * STRIDE;
-                    // Above, then to the left.
-                    let neighbours = [before, before + CHANNELS];
-                    relax(value, high, low, span, step * STRIDE + CHANNELS, neighbours);
-                }
-            } else {
-                for step in (0..bands.steps - 1).rev() {
-                    let after = (step + 1) * STRIDE;
-                    // Below, then to the right.
-                    let neighbours = [after + 2 * CHANNELS, after + CHANNELS];
-                    relax(value, high, low, span, step * STRIDE + CHANNELS, neighbours);
-                }
-            }
+            self.give(color, extra);
         });
     }
-}
 
-/// How bands are laid out.
-#[derive(Clone, Copy)]
-struct Bands {
-    width: usize,
-    /// Steps of a band: each row starts one later than the one above, and the
-    /// row above the band has its own.
-    steps: usize,
-}
-
-impl Bands {
-    /// Offset of column `x` in a slot of a band: slot 0 is the row above it,
-    /// slots 1 to [`ROWS`] its rows, the last one the row below.
-    fn place(self, band: usize, slot: usize, x: usize) -> usize {
-        (band * self.steps + x + slot) * STRIDE + slot * CHANNELS
+    fn bands(&self) -> usize {
+        self.size.height.div_ceil(ROWS)
     }
-}
 
-fn four(bytes: &[u8], at: usize) -> [u8; CHANNELS] {
-    bytes[at..].first_chunk().copied().unwrap_or_default()
-}
+    /// Steps of a band: each row starts one later than the one above.
+    fn steps(&self) -> usize {
+        self.size.width + ROWS - 1
+    }
 
-/// The paths to the cells from `at` on, where better over one of their neighbours.
-#[inline(always)]
-fn relax(
-    value: &[u8],
-    high: &mut [u8],
-    low: &mut [u8],
-    span: &mut [u8],
-    at: usize,
-    neighbours: [usize; 2],
-) {
-    let load = |bytes: &[u8], at: usize| -> [u8; LANES] {
-        bytes[at..].first_chunk().copied().unwrap_or([0; LANES])
-    };
-    let value = load(value, at);
-    let (mut h, mut l, mut b) = (load(high, at), load(low, at), load(span, at));
-    for neighbour in neighbours {
-        let (other_high, other_low) = (load(high, neighbour), load(low, neighbour));
-        for i in 0..LANES {
-            let over = other_high[i].max(value[i]);
-            let under = other_low[i].min(value[i]);
-            let better = over - under < b[i];
-            b[i] = if better { over - under } else { b[i] };
-            h[i] = if better { over } else { h[i] };
-            l[i] = if better { under } else { l[i] };
+    /// Step and byte of a cell.
+    #[inline(always)]
+    fn place(&self, x: usize, y: usize) -> (usize, usize) {
+        (y / ROWS * self.steps() + x + y % ROWS, y % ROWS * CHANNELS)
+    }
+
+    /// Beyond the image a cell is one that no path leads to or through: its
+    /// barrier is 0, so that none is better, and it spans all values, so that
+    /// what leads through it has a barrier of 255.
+    fn fit(&mut self, size: Size) {
+        self.size = size;
+        let steps = self.bands() * self.steps();
+        for (buffer, outside) in [
+            (&mut self.value, 0),
+            (&mut self.high, 0),
+            (&mut self.low, 0),
+            (&mut self.span, 0),
+            (&mut self.outside, u8::MAX),
+            (&mut self.first, 0),
+        ] {
+            buffer.clear();
+            buffer.resize(steps, [outside; LANES]);
+        }
+        let Size { width, height } = size;
+        for y in 0..height {
+            for x in 0..width {
+                let (step, at) = self.place(x, y);
+                let border = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
+                self.outside[step][at..at + CHANNELS].fill(0);
+                self.first[step][at..at + CHANNELS].fill(if border { 0 } else { u8::MAX });
+            }
         }
     }
-    high[at..at + LANES].copy_from_slice(&h);
-    low[at..at + LANES].copy_from_slice(&l);
-    span[at..at + LANES].copy_from_slice(&b);
+
+    /// Writes the values askew.
+    #[inline(always)]
+    fn take(&mut self, rgb: &Image<[u8; 3]>, fourth: &Image<u8>) {
+        self.row.resize(self.size.width, 0);
+        for y in 0..self.size.height {
+            let cells = rgb.row(y).iter().zip(fourth.row(y));
+            for (value, (&rgb, &fourth)) in self.row.iter_mut().zip(cells) {
+                let [luma, cb, cr] = ycbcr(rgb);
+                *value = u32::from_le_bytes([luma, cb, cr, fourth]);
+            }
+            let (first, at) = self.place(0, y);
+            for (step, value) in self.value[first..].iter_mut().zip(&self.row) {
+                step[at..at + CHANNELS].copy_from_slice(&value.to_le_bytes());
+            }
+        }
+    }
+
+    /// Reads the barriers.
+    #[inline(always)]
+    fn give(&mut self, color: &mut Image<f32>, extra: &mut Image<f32>) {
+        for y in 0..self.size.height {
+            let (first, at) = self.place(0, y);
+            for (value, step) in self.row.iter_mut().zip(&self.span[first..]) {
+                *value = cell(step, at);
+            }
+            let out = color.row_mut(y).iter_mut().zip(extra.row_mut(y));
+            for ((color, extra), value) in out.zip(&self.row) {
+                let [y, cb, cr] = [value & 0xff, value >> 8 & 0xff, value >> 16 & 0xff];
+                *color = (y + cb + cr) as f32;
+                *extra = (value >> 24) as f32;
+            }
+        }
+    }
+
+    /// One scan over a band, from the first step on or from the last one back.
+    #[inline(always)]
+    fn scan<S: Simd, const FORWARD: bool, const FIRST: bool>(&mut self, simd: S, band: usize) {
+        const LAST: usize = LANES - CHANNELS;
+        let steps = self.steps();
+        let all = u8x64::splat(simd, u8::MAX);
+        // Beyond the first step lies nothing.
+        let mut last = Path { high: all, low: !all };
+        for i in 0..steps {
+            let step = if FORWARD { i } else { steps - 1 - i };
+            // The cell that lies in the next band.
+            let (beside, at) = if FORWARD {
+                let above = band.checked_sub(1).map(|above| above * steps + step + ROWS - 1);
+                (above.filter(|_| step + ROWS - 1 < steps), LAST)
+            } else {
+                let below = step.checked_sub(ROWS - 1).map(|x| (band + 1) * steps + x);
+                (below.filter(|_| band + 1 < self.bands()), 0)
+            };
+            let beside = beside.and_then(|i| Some((self.high.get(i)?, self.low.get(i)?)));
+            let (high, low) = beside.map_or((u32::MAX, 0), |(h, l)| (cell(h, at), cell(l, at)));
+            let (high, low) = (u32x16::splat(simd, high), u32x16::splat(simd, low));
+            let [up, down]: [u32x16<S>; 2] = [last.high.bitcast(), last.low.bitcast()];
+            let upright = if FORWARD {
+                Path { high: high.slide::<15>(up).bitcast(), low: low.slide::<15>(down).bitcast() }
+            } else {
+                Path { high: up.slide::<1>(high).bitcast(), low: down.slide::<1>(low).bitcast() }
+            };
+            let index = band * steps + step;
+            let value = u8x64::load_array_ref(simd, &self.value[index]);
+            let mut path = if FIRST {
+                let outside = u8x64::load_array_ref(simd, &self.outside[index]);
+                Path { high: value | outside, low: value }
+            } else {
+                Path {
+                    high: u8x64::load_array_ref(simd, &self.high[index]),
+                    low: u8x64::load_array_ref(simd, &self.low[index]),
+                }
+            };
+            let span = if FIRST { &self.first } else { &self.span };
+            let mut span = u8x64::load_array_ref(simd, &span[index]);
+            for neighbour in [upright, last] {
+                let (high, low) = (neighbour.high.max(value), neighbour.low.min(value));
+                let better = (high - low).simd_lt(span);
+                span = span.min(high - low);
+                path.high = better.select(high, path.high);
+                path.low = better.select(low, path.low);
+            }
+            path.high.store_slice(&mut self.high[index]);
+            path.low.store_slice(&mut self.low[index]);
+            span.store_slice(&mut self.span[index]);
+            last = path;
+        }
+    }
 }
+
+/// The largest and the smallest value on the best paths to the cells of a step.
+#[derive(Clone, Copy)]
+struct Path<S: Simd> {
+    high: u8x64<S>,
+    low: u8x64<S>,
+}
+
+/// The four bytes from `at` on.
+#[inline(always)]
+fn cell(step: &Step, at: usize) -> u32 {
+    u32::from_le_bytes(step[at..].first_chunk().copied().unwrap_or_default())
+}
+
+// A cell is a lane of 32 bits.
+const _: () = assert!(CHANNELS == 4 && ROWS == 16);
