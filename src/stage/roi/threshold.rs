@@ -9,10 +9,19 @@ const BINS: usize = 256;
 /// them (Otsu 1979), among the 255 inner edges of a histogram of 256 bins.
 /// Infinite, so that nothing exceeds it, when all values fall into one bin.
 pub fn otsu(map: &Image<f32>) -> f32 {
-    let mut histogram = [0_u64; BINS];
-    for &value in map.pixels() {
-        // The cast takes NaN and negative values to 0.
-        histogram[((value * BINS as f32) as usize).min(BINS - 1)] += 1;
+    // Neighbours fall into the same bin, which would wait for itself.
+    let mut histograms = [[0_u64; BINS]; 4];
+    for values in map.pixels().chunks(4) {
+        for (histogram, value) in histograms.iter_mut().zip(values) {
+            // The cast takes NaN and negative values to 0.
+            histogram[((value * BINS as f32) as usize).min(BINS - 1)] += 1;
+        }
+    }
+    let [mut histogram, others @ ..] = histograms;
+    for other in others {
+        for (count, other) in histogram.iter_mut().zip(other) {
+            *count += other;
+        }
     }
     let total: u64 = histogram.iter().sum();
     let total_moment: u64 = histogram.iter().zip(0..).map(|(&count, bin)| count * bin).sum();

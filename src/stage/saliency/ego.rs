@@ -97,7 +97,7 @@ impl EgoMotion {
     /// in the camera's translation and rotation, else an affine flow.
     pub fn run(&mut self, flow: &Flow, scene: &AttentionScene<'_>, has_depth: bool) -> bool {
         let held = HELD * std::mem::take(&mut self.most);
-        let trust = flow.trust.pixels().iter().sum::<f32>();
+        let trust = sum(flow.trust.pixels());
         if trust < LEAST_TRUST * flow.trust.size().area() as f32 {
             return false;
         }
@@ -213,6 +213,18 @@ impl EgoMotion {
         let middle = self.ranked.len() / 2;
         RAYLEIGH * *self.ranked.select_nth_unstable_by(middle, f32::total_cmp).1
     }
+}
+
+/// In lanes: one sum would wait for itself.
+fn sum(values: &[f32]) -> f32 {
+    let mut sums = [0.0; 2 * LANES];
+    let (whole, rest) = values.as_chunks::<{ 2 * LANES }>();
+    for values in whole {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += value;
+        }
+    }
+    sums.iter().chain(rest).sum()
 }
 
 impl Equations {

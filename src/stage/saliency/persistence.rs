@@ -7,7 +7,7 @@
 
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use crate::stage::saliency::PreviousFrame;
 use crate::stage::saliency::flow::Flow;
 
@@ -53,10 +53,10 @@ impl Persistence {
         self.gain.resize(attention.size());
         let Self { level, share, gain, .. } = self;
         if before.attended.size() == attention.size() {
-            dispatch!(*level, _simd => smooth::<true>(attention, before, flow, *share, gain));
+            dispatch!(*level, simd => smooth::<_, true>(simd, attention, before, flow, *share, gain));
         } else {
             gain.fill(0.0);
-            dispatch!(*level, _simd => smooth::<false>(attention, before, flow, *share, gain));
+            dispatch!(*level, simd => smooth::<_, false>(simd, attention, before, flow, *share, gain));
         }
     }
 
@@ -79,9 +79,13 @@ impl Persistence {
     }
 }
 
+/// Cells that are smoothed at once.
+const LANES: usize = 16;
+
 /// Smooths the map, and where the marks are `KEPT` fills what each cell gains.
 #[inline(always)]
-fn smooth<const KEPT: bool>(
+fn smooth<S: Simd, const KEPT: bool>(
+    simd: S,
     attention: &mut Image<f32>,
     before: &PreviousFrame,
     flow: &Flow,
@@ -90,51 +94,82 @@ fn smooth<const KEPT: bool>(
 ) {
     let size = attention.size();
     for y in 0..size.height {
-        let shifts = flow.dx.row(y).iter().zip(flow.dy.row(y)).zip(flow.trust.row(y));
-        let cells = attention.row_mut(y).iter_mut().zip(gain.row_mut(y));
-        for (x, ((now, gain), ((dx, dy), trust))) in cells.zip(shifts).enumerate() {
-            let place = Place::new(size, x as f32 + dx, y as f32 + dy);
-            *now += share * trust * (place.of(before.attention.pixels()) - *now);
+        for x in (0..size.width).step_by(LANES) {
+            let [dx, dy, trust] = [&flow.dx, &flow.dy, &flow.trust].map(|map| map.row(y));
+            let (dx, dy, trust) = (load(simd, dx, x), load(simd, dy, x), load(simd, trust, x));
+            let here = f32x16::from_fn(simd, |i| (x + i) as f32);
+            let place = Place::new(size, here + dx, dy + y as f32);
+            let now = load(simd, attention.row(y), x);
+            let past = place.of(simd, before.attention.pixels());
+            store(attention.row_mut(y), x, now + trust * share * (past - now));
             if KEPT {
-                let attended = place.of(before.attended.pixels());
-                *gain = trust * ((STAYS + COMES) * attended - COMES);
+                let attended = place.of(simd, before.attended.pixels());
+                store(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
             }
         }
     }
 }
 
-/// Four cells around a place, and its distance from the upper left one.
-struct Place {
-    at: usize,
-    right: usize,
-    below: usize,
-    fx: f32,
-    fy: f32,
+/// The values of a row from `x` on; beyond its end 0.
+#[inline(always)]
+fn load<S: Simd>(simd: S, row: &[f32], x: usize) -> f32x16<S> {
+    let row = &row[x..];
+    if let Some(values) = row.first_chunk::<LANES>() {
+        return f32x16::from_slice(simd, values);
+    }
+    let mut values = [0.0; LANES];
+    values[..row.len()].copy_from_slice(row);
+    f32x16::from_slice(simd, &values)
 }
 
-impl Place {
+/// Writes those of the values from `x` on that are inside a row.
+#[inline(always)]
+fn store<S: Simd>(row: &mut [f32], x: usize, values: f32x16<S>) {
+    let row = &mut row[x..];
+    if let Some(row) = row.first_chunk_mut::<LANES>() {
+        values.store_slice(row);
+    } else {
+        row.copy_from_slice(&values.as_slice()[..row.len()]);
+    }
+}
+
+/// For each of several places the cell to its upper left, and its distance from that.
+struct Place<S: Simd> {
+    at: u32x16<S>,
+    width: usize,
+    fx: f32x16<S>,
+    fy: f32x16<S>,
+}
+
+impl<S: Simd> Place<S> {
     /// `(x, y)` in an image of `size`, limited to it.
     #[inline(always)]
-    fn new(Size { width, height }: Size, x: f32, y: f32) -> Self {
-        let x = x.clamp(0.0, (width - 1) as f32);
-        let y = y.clamp(0.0, (height - 1) as f32);
-        let (x0, y0) = (x as usize, y as usize);
-        Self {
-            at: y0 * width + x0,
-            right: usize::from(x0 + 1 < width),
-            below: usize::from(y0 + 1 < height) * width,
-            fx: x - x0 as f32,
-            fy: y - y0 as f32,
-        }
+    fn new(Size { width, height }: Size, x: f32x16<S>, y: f32x16<S>) -> Self {
+        let x = x.max(0.0).min((width - 1) as f32);
+        let y = y.max(0.0).min((height - 1) as f32);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (column, row): (u32x16<S>, u32x16<S>) = (x0.to_int(), y0.to_int());
+        Self { at: row * width as u32 + column, width, fx: x - x0, fy: y - y0 }
     }
 
-    /// Bilinear value.
+    /// Bilinear values. The pixels are fetched one place after the other; what
+    /// is right of the last column or below the last row has no share.
     #[inline(always)]
-    fn of(&self, pixels: &[f32]) -> f32 {
-        let (at, right) = (self.at, self.right);
-        let upper = pixels[at] + self.fx * (pixels[at + right] - pixels[at]);
-        let at = at + self.below;
-        let lower = pixels[at] + self.fx * (pixels[at + right] - pixels[at]);
+    fn of(&self, simd: S, pixels: &[f32]) -> f32x16<S> {
+        let pair = |at: usize| pixels[at..].first_chunk().copied().unwrap_or([pixels[at]; 2]);
+        let [mut upper, mut lower] = [[[0.0; 2]; LANES]; 2];
+        for (i, at) in self.at.as_slice().iter().enumerate() {
+            let (at, below) = (*at as usize, *at as usize + self.width);
+            upper[i] = pair(at);
+            lower[i] = if below < pixels.len() { pair(below) } else { upper[i] };
+        }
+        let across = |pairs: &[[f32; 2]; LANES]| {
+            let (first, second) = pairs.as_flattened().split_at(LANES);
+            let first = f32x16::from_slice(simd, first);
+            let (from, to) = first.deinterleave(f32x16::from_slice(simd, second));
+            from + self.fx * (to - from)
+        };
+        let (upper, lower) = (across(&upper), across(&lower));
         upper + self.fy * (lower - upper)
     }
 }

@@ -4,6 +4,11 @@
 //! does; in pictures of things the minimum barrier distance does, and where a
 //! table is seen from above the relief. The plane decides which is asked.
 
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
 mod on_plane;
 mod on_table;
 mod without_plane;
@@ -13,7 +18,7 @@ use super::ego::EgoMotion;
 use super::{AttentionScene, Scene};
 use crate::image::Image;
 use crate::perception::View;
-use crate::simd::Level;
+use crate::simd::{Level, dispatch};
 use crate::stage::ground::{Footing, Ground};
 use crate::stage::table::Table;
 
@@ -32,6 +37,7 @@ const STEEP_STILL: f32 = 0.5;
 /// The mode with its cues.
 #[derive(Debug)]
 pub struct SceneSaliency {
+    level: Level,
     ground: Ground,
     table: Table,
     barrier: Barrier,
@@ -49,6 +55,7 @@ impl SceneSaliency {
     /// The mode at this SIMD level.
     pub fn new(level: Level) -> Self {
         Self {
+            level,
             ground: Ground::default(),
             table: Table::default(),
             barrier: Barrier::new(level),
@@ -127,10 +134,25 @@ impl SceneSaliency {
 
     /// Disparity as a byte, 0 at infinity and 255 at the largest one.
     fn scale_disparity(&mut self, filled: &Image<f32>) {
-        let largest = filled.pixels().iter().fold(1.0_f32, |m, &d| m.max(d));
         self.fourth.resize(filled.size());
-        for (out, &d) in self.fourth.pixels_mut().iter_mut().zip(filled.pixels()) {
-            *out = (d / largest * 255.0) as u8;
+        let out = self.fourth.pixels_mut();
+        dispatch!(self.level, _simd => scale_to_bytes(filled.pixels(), out));
+    }
+}
+
+#[inline(always)]
+fn scale_to_bytes(values: &[f32], out: &mut [u8]) {
+    // The largest of every sixteenth value, and of those.
+    let mut largest = [1.0_f32; 16];
+    let (whole, rest) = values.as_chunks::<16>();
+    for values in whole {
+        for i in 0..16 {
+            largest[i] = largest[i].max(values[i]);
         }
+    }
+    let largest = largest.iter().chain(rest).fold(1.0_f32, |most, &value| most.max(value));
+    for (out, &value) in out.iter_mut().zip(values) {
+        // To a wide integer first: that is one instruction.
+        *out = (value / largest * 255.0).max(0.0) as i32 as u8;
     }
 }
