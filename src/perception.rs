@@ -41,6 +41,9 @@ pub struct StereoFrame {
 pub struct View {
     /// Colours; a gray camera gives equal channels.
     pub rgb: Image<[u8; 3]>,
+    /// True where `rgb` is known to say no more than `gray`: who reads that reads
+    /// a third.
+    pub is_gray: bool,
     /// Luma (ITU-R BT.601), after denoising and illumination normalisation.
     pub gray: Image<u8>,
     /// Gradient magnitude of `gray`: (|Sobel x| + |Sobel y|) / 8, saturated.
@@ -109,6 +112,7 @@ impl Perception {
             rig,
             left: View {
                 rgb: Image::new(size),
+                is_gray: false,
                 gray: Image::new(size),
                 gradient: Image::new(size),
             },

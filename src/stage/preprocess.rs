@@ -115,6 +115,9 @@ impl Preprocess {
                 self.rgb.run(pixels, rgb.width(), left_map, out, self.size.width);
             }
         }
+        // Later steps change the gray values alone.
+        out.left.is_gray = matches!(frame.left, Picture::Gray(_))
+            && matches!(self.illumination, Illumination::None);
         match self.illumination {
             Illumination::None => {}
             Illumination::Clahe => {

@@ -40,6 +40,8 @@ pub struct Roi {
     allowance: f64,
     salient: BitMask,
     matched: BitMask,
+    /// Pixels of `matched`.
+    area: usize,
     components: Components,
     budget: Budget,
 }
@@ -63,6 +65,7 @@ impl Roi {
             allowance: 1.0,
             salient: BitMask::default(),
             matched: BitMask::default(),
+            area: 0,
             components: Components::default(),
             budget: Budget::default(),
         }
@@ -100,6 +103,7 @@ impl Roi {
             self.salient.reset(self.size);
             self.salient.fill();
             self.matched.copy_from(&self.salient);
+            self.area = self.matched.count();
         } else {
             let threshold = self.threshold.unwrap_or_else(|| otsu(attention));
             self.salient.set_from(self.level, saliency, threshold);
@@ -112,7 +116,7 @@ impl Roi {
         }
         self.salient.write(&mut out.salient);
         self.matched.write(&mut out.matched);
-        out.fraction = self.matched.count() as f32 / self.size.area().max(1) as f32;
+        out.fraction = self.area as f32 / self.size.area().max(1) as f32;
     }
 
     /// A rectangle of the image's aspect around its centre.
@@ -130,6 +134,7 @@ impl Roi {
     fn dilate(&mut self) {
         self.matched.copy_from(&self.salient);
         self.matched.dilate(self.dilation);
+        self.area = self.matched.count();
     }
 
     /// Keeps `Z_min <= Z <= Z_max`, as `f B / Z_max <= d <= f B / Z_min`.
@@ -146,10 +151,11 @@ impl Roi {
 
     fn keep_budget(&mut self, attention: &Image<f32>) {
         let limit = (self.max_fraction.min(self.allowance) * self.size.area() as f64) as usize;
-        if self.matched.count() > limit {
+        if self.area > limit {
             self.budget.choose(&self.matched, attention, limit);
             self.budget.apply(&mut self.matched);
             self.budget.apply(&mut self.salient);
+            self.area = self.matched.count();
         }
     }
 }

@@ -329,7 +329,7 @@ fn a_pale_thing_in_a_still_is_of_interest_and_an_empty_still_is_not() {
         let inside = |x: usize, y: usize| (130..190).contains(&x) && (90..150).contains(&y);
         let gray = Image::from_fn(size, |x, y| 120 + if inside(x, y) { contrast } else { 0 });
         let rgb = Image::from_fn(size, |x, y| [gray.get(x, y); 3]);
-        let left = View { gray, rgb, gradient: Image::new(size) };
+        let left = View { gray, rgb, ..View::default() };
         let cells = size.divided_by(4);
         let coarse = CoarseDisparity {
             checked: Image::filled(cells, f32::NAN),

@@ -146,7 +146,7 @@ impl Watch {
         Self {
             stage: Saliency::new(&Config::default(), SIZE, simd::detect()),
             previous: Previous::default(),
-            left: View { gray, rgb, gradient: Image::new(SIZE) },
+            left: View { gray, rgb, ..View::default() },
         }
     }
 

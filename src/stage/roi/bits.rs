@@ -123,16 +123,17 @@ impl BitMask {
                 towards_lower(row, step);
             }
         }
-        let (stride, length) = (self.stride, self.words.len());
         for step in steps(radius) {
             // Downwards: rows from the last on, so that sources are still unchanged.
-            for i in (step * stride..length).rev() {
-                self.words[i] |= self.words[i - step * stride];
+            for y in (step..self.size.height).rev() {
+                let (above, here) = self.words.split_at_mut(y * self.stride);
+                merge(&mut here[..self.stride], &above[(y - step) * self.stride..]);
             }
         }
         for step in steps(radius) {
-            for i in step * stride..length {
-                self.words[i - step * stride] |= self.words[i];
+            for y in step..self.size.height {
+                let (above, here) = self.words.split_at_mut(y * self.stride);
+                merge(&mut above[(y - step) * self.stride..][..self.stride], here);
             }
         }
         self.clear_tails();
@@ -186,19 +187,29 @@ fn steps(radius: usize) -> impl Iterator<Item = usize> {
     })
 }
 
-fn towards_higher(row: &mut [u64], step: usize) {
-    for i in (1..row.len()).rev() {
-        row[i] |= row[i] << step | row[i - 1] >> (WORD - step);
+/// Sets in one row what is set in another.
+fn merge(row: &mut [u64], other: &[u64]) {
+    for (word, other) in row.iter_mut().zip(other) {
+        *word |= other;
     }
-    row[0] |= row[0] << step;
+}
+
+fn towards_higher(row: &mut [u64], step: usize) {
+    let mut before = 0;
+    for word in row {
+        let here = *word;
+        *word |= here << step | before >> (WORD - step);
+        before = here;
+    }
 }
 
 fn towards_lower(row: &mut [u64], step: usize) {
-    let last = row.len() - 1;
-    for i in 0..last {
-        row[i] |= row[i] >> step | row[i + 1] << (WORD - step);
+    let mut after = 0;
+    for word in row.iter_mut().rev() {
+        let here = *word;
+        *word |= here >> step | after << (WORD - step);
+        after = here;
     }
-    row[last] |= row[last] >> step;
 }
 
 /// Bit `x` of `words` says whether value `x` is at least `threshold`.
@@ -232,6 +243,17 @@ pub fn first_set(words: &[u64], from: usize) -> Option<usize> {
         word = *words.get(index)?;
     }
     Some(index * WORD + word.trailing_zeros() as usize)
+}
+
+/// The first bit from bit `from` on that is not set; there is none beyond the end.
+pub fn first_clear(words: &[u64], from: usize) -> usize {
+    let mut index = from / WORD;
+    let mut word = words.get(index).map_or(0, |word| word | !(u64::MAX << (from % WORD)));
+    while word == u64::MAX {
+        index += 1;
+        word = words.get(index).copied().unwrap_or(0);
+    }
+    index * WORD + word.trailing_ones() as usize
 }
 
 /// The last set bit before bit `to`.
@@ -272,6 +294,10 @@ mod tests {
         assert_eq!(first_set(&words, 0), Some(63));
         assert_eq!(first_set(&words, 64), Some(133));
         assert_eq!(first_set(&words, 134), None);
+        assert_eq!(first_clear(&words, 0), 0);
+        assert_eq!(first_clear(&words, 63), 64);
+        assert_eq!(first_clear(&[u64::MAX, 7], 3), 67);
+        assert_eq!(first_clear(&[u64::MAX; 2], 3), 128);
         assert_eq!(last_set(&words, 192), Some(133));
         assert_eq!(last_set(&words, 133), Some(63));
         assert_eq!(last_set(&words, 63), None);

@@ -5,6 +5,7 @@ use crate::perception::View;
 use crate::simd::Level;
 use crate::stage::coarse::CELL;
 use crate::stage::preprocess::gradient::gradient;
+use crate::stage::preprocess::luma::spread;
 use crate::stage::preprocess::resize::box_mean;
 
 /// Means of `view` over [`CELL`] x [`CELL`] pixels, rounded to nearest. Cells
@@ -17,7 +18,10 @@ pub fn shrink_view(level: Level, view: &View, out: &mut View) {
     out.gray.resize(size);
     let width = view.gray.width();
     box_mean::<1, CELL>(level, view.gray.pixels(), width, out.gray.pixels_mut(), size.width);
-    if view.rgb.size() == view.gray.size() {
+    out.is_gray = view.is_gray;
+    if view.is_gray {
+        spread(&out.gray, &mut out.rgb);
+    } else if view.rgb.size() == view.gray.size() {
         out.rgb.resize(size);
         let rgb = out.rgb.pixels_mut().as_flattened_mut();
         box_mean::<3, CELL>(level, view.rgb.pixels().as_flattened(), width, rgb, size.width);
