@@ -36,6 +36,9 @@ const MAX_SPREAD_PART: f32 = 0.4;
 /// Without a plane, the sum of saliency from which a candidate counts, in parts
 /// of the largest one: patterns and edges fall into many small ones.
 const LEAST_WEIGHT: f32 = 0.05;
+/// Least confidence of a region on a plane, for which it is calibrated: what is seen
+/// by one camera only beside a thing is small and has few disparities.
+const LEAST_CONFIDENCE: f32 = 0.2;
 /// Weights of the confidence: logistic regression on 800 regions of a rendered
 /// street, a rendered table and photographed tables; calibration error .06 on the
 /// street and .04 on the tables, .13 on the street when that is left out of the
@@ -146,8 +149,10 @@ impl Regions {
         }
         self.measure(source, regions);
         let mut evidence = self.evidence.iter();
+        let on_plane = source.plane.or(source.table).is_some();
+        let least = if on_plane { LEAST_CONFIDENCE } else { 0.0 };
         regions.retain(|region| {
-            let count = evidence.next().and_then(|e| refusal(e, region, rejections));
+            let count = evidence.next().and_then(|e| refusal(e, region, least, rejections));
             count.map(|count| *count += 1).is_none()
         });
         if source.plane.is_none() && source.table.is_none() {
@@ -242,9 +247,12 @@ fn retain_weighty(regions: &mut RegionList, rejections: &mut Rejections) {
 fn refusal<'a>(
     evidence: &Evidence,
     region: &Region,
+    least_confidence: f32,
     rejections: &'a mut Rejections,
 ) -> Option<&'a mut u32> {
-    if region.valid_fraction < MIN_VALID_FRACTION || evidence.mean_confidence < MIN_MEAN_CONFIDENCE
+    if region.valid_fraction < MIN_VALID_FRACTION
+        || evidence.mean_confidence < MIN_MEAN_CONFIDENCE
+        || region.confidence < least_confidence
     {
         return Some(&mut rejections.low_confidence);
     }

@@ -76,6 +76,25 @@ fn surfaces_have_one_disparity_and_are_even_down_to_the_ground() {
 }
 
 #[test]
+fn what_ends_below_something_farther_gains_and_a_wall_does_not() {
+    let size = Size::new(120, 60);
+    let plane = plane(size);
+    // A wall at the left up to the upper edge, and a hedge of the same depth at the right.
+    let mut disparity = Image::from_fn(size, |x, y| {
+        let ground = plane.disparity(4.0 * x as f32 + 1.5, 4.0 * y as f32 + 1.5);
+        let stands = if x < 60 || y >= 22 { 14.0_f32 } else { 2.0 };
+        ground.max(stands)
+    });
+    let mut columns = Columns::new(simd::detect());
+    columns.find(&mut disparity, &plane);
+    let cue = Image::filled(size, 0.4);
+    let mut out = Image::new(size);
+    columns.even_out(&disparity, &plane, &cue, &mut out);
+    let (wall, hedge): (f32, f32) = (out.get(30, 26), out.get(90, 26));
+    assert!((wall - 0.4).abs() < 1e-5 && (hedge - 0.6).abs() < 1e-5, "{wall} {hedge}");
+}
+
+#[test]
 fn only_what_is_as_deep_is_averaged() {
     for size in sizes() {
         let disparity = disparity(size, 34);

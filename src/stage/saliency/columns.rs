@@ -8,6 +8,7 @@
 use crate::image::Image;
 use crate::simd::{Level, dispatch};
 use crate::stage::ground::{Plane, cell_centre};
+use crate::stage::saliency::lateral;
 
 /// Height in metres (of a road scene) where things begin.
 pub const LOW_M: f32 = 0.15;
@@ -28,6 +29,10 @@ const MEAN_PART: f32 = 0.12;
 const FOOT_PART: f32 = 0.08;
 /// Least height in metres (of a road scene) of a cell that is.
 const EVIDENCE_M: f32 = 0.2;
+
+/// What a surface gains that ends against something farther: what people make and
+/// what they are is lower than 2.6 m, a wall goes on.
+const RISE: f32 = 0.2;
 
 /// Where in a surface a cell is.
 const OUTSIDE: f32 = 0.0;
@@ -85,8 +90,10 @@ impl Columns {
     }
 
     /// A surface is as salient as its parts: no cell of it counts less than the
-    /// mean of `cue` over it, down to where it meets the ground, if it is
-    /// high enough to be a thing. `disparity` is that of [`Columns::find`].
+    /// mean of `cue` over it, and .2 of the contrast to what is seen above its top
+    /// (the drop of disparity, measured as that to the sides), down to where it meets
+    /// the ground, if it is high enough to be a thing. `disparity` is that of
+    /// [`Columns::find`].
     pub fn even_out(
         &mut self,
         disparity: &Image<f32>,
@@ -114,7 +121,13 @@ impl Columns {
         dispatch!(*level, _simd => {
             for y in 0..size.height {
                 let above = Carried { value, of, place };
-                let cells = Cells { part: part.row(y), mean: mean.row(y), disparity: disparity.row(y) };
+                let cells = Cells {
+                    part: part.row(y),
+                    mean: mean.row(y),
+                    disparity: disparity.row(y),
+                    // Above the image nothing is known.
+                    upper: disparity.row(y.saturating_sub(1)),
+                };
                 descend(above, &cells, plane, y, out.row_mut(y));
             }
         });
@@ -179,6 +192,8 @@ struct Cells<'a> {
     part: &'a [f32],
     mean: &'a [f32],
     disparity: &'a [f32],
+    /// Disparity in the row above.
+    upper: &'a [f32],
 }
 
 #[inline(always)]
@@ -186,15 +201,19 @@ fn descend(above: Carried<'_>, cells: &Cells<'_>, plane: &Plane, y: usize, out: 
     let scale = plane.scale();
     let (lowest, fade_in) = (LOW_M * scale, 1.0 / (FADE_IN_M * scale));
     let state = above.value.iter_mut().zip(above.of).zip(above.place);
-    let cells = cells.part.iter().zip(cells.mean).zip(cells.disparity).zip(out);
-    for (x, ((((&part, &mean), &d), out), ((value, of), place))) in cells.zip(state).enumerate() {
+    let depths = cells.disparity.iter().zip(cells.upper);
+    let cells = cells.part.iter().zip(cells.mean).zip(depths).zip(out);
+    for (x, ((((&part, &mean), (&d, &upper)), out), ((value, of), place))) in
+        cells.zip(state).enumerate()
+    {
         let (u, v) = cell_centre(x, y);
         let at = plane.disparity(u, v);
         let on = part > OUTSIDE;
         let top = on && *place < 1.0;
         let height = plane.camera_height_m * (d - at) / d.max(LEAST_DISPARITY);
         let gate = ((height - lowest) * fade_in).clamp(0.0, 1.0);
-        *value = if top { gate * mean } else { *value };
+        let rise = lateral::contrast(d - upper - lateral::NOISE_PX, d).max(0.0);
+        *value = if top { (gate * (mean + RISE * rise)).min(1.0) } else { *value };
         *of = if top { d } else { *of };
         let foot = *place > 0.0 && (d - *of).abs() <= FOOT_PART * *of && at < *of;
         let ends = if on || foot { 0.5 } else { 0.0 };

@@ -16,7 +16,7 @@ const REACH_M: f32 = 2.5;
 /// Relative drop of disparity that counts fully.
 const FULL_DROP: f32 = 0.35;
 /// A drop up to this many pixels is noise.
-const NOISE_PX: f32 = 0.15;
+pub const NOISE_PX: f32 = 0.15;
 
 /// Lateral depth contrast, with its buffers.
 #[derive(Debug)]
@@ -67,11 +67,17 @@ impl Lateral {
                     out.row_mut(y).iter_mut().zip(d).zip(left.iter()).zip(right.iter())
                 {
                     let drop = l.min(r) + 0.5 * l.max(r) - 1.5 * NOISE_PX;
-                    *out = (drop / (FULL_DROP * d.max(0.5))).min(1.0);
+                    *out = contrast(drop, d);
                 }
             }
         });
     }
+}
+
+/// A drop of disparity from `disparity`, in pixels, as a contrast of at most 1.
+#[inline(always)]
+pub fn contrast(drop: f32, disparity: f32) -> f32 {
+    (drop / (FULL_DROP * disparity.max(0.5))).min(1.0)
 }
 
 /// The larger of `most` and the drop from here to there, where `at` is within reach.

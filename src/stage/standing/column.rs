@@ -16,8 +16,9 @@ const TALL_M: f32 = 4.2;
 const MAX_HOLES: usize = 2;
 /// Cells above a segment among which the next disparity is looked for.
 const LOOK_UP: usize = 6;
-/// Largest distance of a cell from its segment's mean disparity, in parts.
-const SEGMENT_PART: f32 = 0.12;
+/// Largest distance of a cell from its segment's mean disparity, in parts: the bonnet
+/// of a car and what is parked a metre before it are two.
+const SEGMENT_PART: f32 = 0.1;
 /// Largest difference in disparity of a thing's foot from the thing, in parts.
 const FOOT_PART: f32 = 0.08;
 

@@ -85,7 +85,8 @@ pub fn surfaces(disparity: &Image<f32>, plane: &Plane) -> (Vec<Surface>, Image<f
     (found, smooth)
 }
 
-/// No cell of a surface and of its foot below the mean of `cue` over the surface.
+/// No cell of a surface and of its foot below the mean of `cue` over the surface, and
+/// a fifth of the contrast to what is above it.
 pub fn even_out(
     surfaces: &[Surface],
     smooth: &Image<f32>,
@@ -99,7 +100,9 @@ pub fn even_out(
         let top = rows[rows.len() - 1];
         let height = lift(plane, x, top, *mean) / mean.max(1.2);
         let gate = (height - 0.15 * plane.scale()) * (1.0 / (0.25 * plane.scale()));
-        let value = gate.clamp(0.0, 1.0) * (sum / rows.len() as f32);
+        let drop = if top > 0 { mean - smooth.get(x, top - 1) - 0.15 } else { 0.0 };
+        let rise = (drop / (0.35 * mean.max(0.5))).clamp(0.0, 1.0);
+        let value = (gate.clamp(0.0, 1.0) * (sum / rows.len() as f32 + 0.2 * rise)).min(1.0);
         let foot = (rows[0] + 1..smooth.height()).take_while(|&y| {
             let d = smooth.get(x, y);
             let (u, v) = cell_centre(x, y);

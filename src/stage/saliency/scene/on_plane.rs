@@ -61,7 +61,8 @@ impl OnPlane {
     /// · (1 + .5 `C_M`) per cell, limited to 1: G is the gate by height above
     /// `plane`, T the share of structure ([`Structure`]), `barrier` the sum of
     /// the barriers of Y, Cb and Cr, `C_M` the motion where it is known. Before
-    /// motion each upright surface is evened out ([`Columns`], [`Beside`]). A pole
+    /// motion each upright surface is evened out and gains where it ends below what
+    /// is farther ([`Columns`], [`Beside`]). A pole
     /// or a trunk is a structure that stands out on both sides: it loses nothing.
     pub fn run(
         &mut self,
