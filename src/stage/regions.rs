@@ -1,8 +1,10 @@
 //! Salient regions with their measures.
 
+pub mod adjoin;
 pub mod components;
 pub mod contour;
 pub mod measure;
+pub mod part;
 pub mod raised;
 pub mod simplify;
 pub mod trim;

@@ -1,7 +1,9 @@
 //! Regions of things on a plane that is looked down upon, from the fine disparity.
 
 use super::RegionSource;
+use super::adjoin::Adjoin;
 use super::components::{Candidates, Components, PixelBox};
+use super::part::Part;
 use crate::image::Image;
 use crate::simd::Level;
 use crate::stage::ground::Plane;
@@ -29,6 +31,8 @@ pub struct Raised {
     outside: Vec<bool>,
     queue: Vec<u32>,
     evidence: Vec<u32>,
+    adjoin: Adjoin,
+    part: Part,
 }
 
 impl Raised {
@@ -43,13 +47,16 @@ impl Raised {
             outside: Vec::new(),
             queue: Vec::new(),
             evidence: Vec::new(),
+            adjoin: Adjoin::default(),
+            part: Part::default(),
         }
     }
 
     /// Candidates for regions off `plane`: connected pixels of one depth
     /// ([`Components`]) inside the region of interest whose disparity exceeds the
     /// plane's by 1.6 px, the salient ones without disparity beside them, and the
-    /// holes without disparity that they enclose.
+    /// holes without disparity that they enclose; what lies
+    /// against a larger one belongs to it ([`Adjoin`]), and necks part ([`Part`]).
     pub fn run(
         &mut self,
         plane: &Plane,
@@ -81,15 +88,28 @@ impl Raised {
             }
         }
         components.run(&self.mask, source.disparity, out);
-        self.weigh(source, out);
+        self.drop_unmeasured(source, out);
         for index in 0..out.boxes.len() {
             let bounds = out.boxes[index];
-            out.boxes[index].area = if self.evidence[index] < LEAST_EVIDENCE {
-                // Too little of it was measured, however large it is.
-                0
-            } else {
-                bounds.area + self.fill(index as u32 + 1, &bounds, source.disparity, &mut out.ids)
-            };
+            if bounds.area > 0 {
+                let id = index as u32 + 1;
+                out.boxes[index].area += self.fill(id, &bounds, source.disparity, &mut out.ids);
+            }
+        }
+        self.adjoin.run(out);
+        for id in 1..=out.boxes.len() as u32 {
+            self.part.run(id, out);
+        }
+        self.drop_unmeasured(source, out);
+    }
+
+    /// Of what little was measured nothing is known, however large it is.
+    fn drop_unmeasured(&mut self, source: &RegionSource<'_>, candidates: &mut Candidates) {
+        self.weigh(source, candidates);
+        for (bounds, _) in
+            candidates.boxes.iter_mut().zip(&self.evidence).filter(|(_, e)| **e < LEAST_EVIDENCE)
+        {
+            bounds.area = 0;
         }
     }
 
