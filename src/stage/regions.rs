@@ -6,6 +6,7 @@ pub mod contour;
 pub mod measure;
 pub mod part;
 pub mod raised;
+pub mod runs;
 pub mod simplify;
 pub mod trim;
 pub mod union_find;

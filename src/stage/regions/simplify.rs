@@ -29,15 +29,16 @@ impl Simplify {
         self.stack.clear();
         self.stack.extend([(0, opposite), (opposite, n)]);
         while let Some((from, to)) = self.stack.pop() {
-            let (a, b) = (points[from], points[to % n]);
-            let mut worst = (limit, None);
-            for (i, &point) in points.iter().enumerate().take(to).skip(from + 1) {
-                let distance = squared_distance(point, a, b);
+            let line = Line::new(points[from], points[to % n]);
+            let mut worst = (0, from);
+            for (i, &point) in (from + 1..).zip(points.get(from + 1..to).unwrap_or_default()) {
+                let distance = line.scaled_distance(point);
                 if distance > worst.0 {
-                    worst = (distance, Some(i));
+                    worst = (distance, i);
                 }
             }
-            if let Some(i) = worst.1 {
+            if worst.0 as f64 > limit * line.scale as f64 {
+                let i = worst.1;
                 self.keep[i] = true;
                 self.stack.extend([(from, i), (i, to)]);
             }
@@ -53,17 +54,33 @@ impl Simplify {
     }
 }
 
-/// Squared distance of a point from a segment, square pixels.
-fn squared_distance(p: [i32; 2], a: [i32; 2], b: [i32; 2]) -> f64 {
-    let (px, py) = (f64::from(p[0] - a[0]), f64::from(p[1] - a[1]));
-    let (bx, by) = (f64::from(b[0] - a[0]), f64::from(b[1] - a[1]));
-    let length = bx * bx + by * by;
-    let along = px * bx + py * by;
-    if along <= 0.0 || length == 0.0 {
-        return px * px + py * py;
+/// A segment between two points.
+struct Line {
+    from: [i64; 2],
+    along: [i64; 2],
+    /// Its squared length, or 1 where it has none.
+    scale: i64,
+}
+
+impl Line {
+    fn new(from: [i32; 2], to: [i32; 2]) -> Self {
+        let (from, to) = (from.map(i64::from), to.map(i64::from));
+        let [x, y] = [to[0] - from[0], to[1] - from[1]];
+        Self { from, along: [x, y], scale: (x * x + y * y).max(1) }
     }
-    if along >= length {
-        return (px - bx).powi(2) + (py - by).powi(2);
+
+    /// Squared distance of a point from the segment, square pixels, times the
+    /// scale: whole numbers, so that nothing is divided.
+    fn scaled_distance(&self, point: [i32; 2]) -> i64 {
+        let [x, y] = [i64::from(point[0]) - self.from[0], i64::from(point[1]) - self.from[1]];
+        let [bx, by] = self.along;
+        let along = x * bx + y * by;
+        if along <= 0 {
+            (x * x + y * y).saturating_mul(self.scale)
+        } else if along >= self.scale {
+            ((x - bx).pow(2) + (y - by).pow(2)).saturating_mul(self.scale)
+        } else {
+            (x * by - y * bx).saturating_pow(2)
+        }
     }
-    (px * by - py * bx).powi(2) / length
 }

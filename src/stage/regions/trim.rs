@@ -7,8 +7,15 @@
 //! Ma et al., "Constant Time Weighted Median Filtering for Stereo Matching and
 //! Beyond", ICCV 2013, which asks the colours of every pixel).
 
+#![allow(
+    clippy::inline_always,
+    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
+)]
+
 use super::components::{Candidates, PixelBox};
+use super::runs::run;
 use crate::image::Image;
+use crate::simd::{LANES, Level, Simd, abs_diff, dispatch, load, prelude::*, u8x32, u16x16};
 
 /// Width in metres (of a road scene) up to which a thing is narrow: a person
 /// who walks, a trunk, a post.
@@ -26,6 +33,15 @@ const ASIDE: usize = 2;
 /// How much nearer that must be to hide a part of the thing, in parts of the disparity.
 const NEARER: f32 = 1.1;
 
+/// Places where an edge may be, and the bytes that are read for all of them: from
+/// the pixel before, three times one vector, the last of them two pixels and two
+/// channels further on.
+const PLACES: usize = MOST_PX + 1;
+const READ: usize = LANES + 2 * 3 + 2;
+
+// The edges of all places fit into a vector.
+const _: () = assert!(3 * (PLACES - 1) < LANES);
+
 /// What the cutting of one thing asks.
 #[derive(Clone, Copy)]
 pub struct Trim<'a> {
@@ -42,33 +58,34 @@ impl Trim<'_> {
     /// upright edge (maximum over R, G and B of |I(x + 1) − I(x − 1)|, added up
     /// over four of seven rows) within six pixels and a third of the row. An end at
     /// something nearer stays: there it is the other thing that grew.
-    pub fn run(&self, id: u32, out: &mut Candidates) {
+    pub fn run(&self, level: Level, id: u32, out: &mut Candidates) {
+        dispatch!(level, simd => self.cut(simd, id, out));
+    }
+
+    #[inline(always)]
+    fn cut<S: Simd>(&self, simd: S, id: u32, out: &mut Candidates) {
         let bounds = out.boxes[id as usize - 1];
         let mut cut = PixelBox::NONE;
         for y in bounds.y0..bounds.y1 {
-            let mut x = bounds.x0;
-            while x < bounds.x1 {
-                let row = &out.ids.row(y)[x..bounds.x1];
-                let skipped = row.iter().take_while(|at| **at != id).count();
-                let length = row[skipped..].iter().take_while(|at| **at == id).count();
-                let (from, to) = (x + skipped, x + skipped + length);
-                x = to.max(x + 1);
-                if length == 0 {
+            let mut next = bounds.x0;
+            while let Some((other, pixels)) = run(&out.ids.row(y)[..bounds.x1], next) {
+                next = pixels.end;
+                if other != id {
                     continue;
                 }
-                let [left, right] = self.ends(from, to, y);
-                out.ids.row_mut(y)[from..left].fill(0);
-                out.ids.row_mut(y)[right..to].fill(0);
-                (cut.x0, cut.x1) = (cut.x0.min(left), cut.x1.max(right));
-                (cut.y0, cut.y1) = (cut.y0.min(y), cut.y1.max(y + 1));
-                cut.area += right - left;
+                let [left, right] = self.ends(simd, pixels.start, pixels.end, y);
+                let row = out.ids.row_mut(y);
+                row[pixels.start..left].fill(0);
+                row[right..pixels.end].fill(0);
+                cut.join(&PixelBox { x0: left, y0: y, x1: right, y1: y + 1, area: right - left });
             }
         }
         out.boxes[id as usize - 1] = cut;
     }
 
     /// The new ends of the pixels `from..to` of row `y`.
-    fn ends(&self, from: usize, to: usize, y: usize) -> [usize; 2] {
+    #[inline(always)]
+    fn ends<S: Simd>(&self, simd: S, from: usize, to: usize, y: usize) -> [usize; 2] {
         let most = MOST_PX.min((to - from) / MOST_PART);
         let hidden = |x: Option<usize>| {
             let beside = x.and_then(|x| self.disparity.row(y).get(x));
@@ -76,43 +93,74 @@ impl Trim<'_> {
         };
         let mut ends = [from, to];
         if !hidden(from.checked_sub(ASIDE)) {
-            ends[0] += self.strongest(most, |k| from + k, y);
+            ends[0] += strongest(self.edges(simd, from, y)[..=most].iter());
         }
         if !hidden(Some(to - 1 + ASIDE)) {
-            ends[1] -= self.strongest(most, |k| to - 1 - k, y);
+            ends[1] -= strongest(self.edges(simd, to - 1 - most, y)[..=most].iter().rev());
         }
         ends
     }
 
-    /// The step inward, from 0 to `most`, at which the edge is strongest.
-    fn strongest(&self, most: usize, at: impl Fn(usize) -> usize, y: usize) -> usize {
+    /// The edges at the pixels from `x` on, added up over the rows around `y`.
+    #[inline(always)]
+    fn edges<S: Simd>(&self, simd: S, x: usize, y: usize) -> [u16; PLACES] {
         let rows = y.saturating_sub(BAND)..(y + BAND + 1).min(self.rgb.height());
-        let (mut best, mut step, mut weight) = (0.0, 0, 1.0);
-        for k in 0..=most {
-            let x = at(k);
-            let (before, after) = (x.saturating_sub(1), (x + 1).min(self.rgb.width() - 1));
-            let edge: u32 = rows
-                .clone()
-                .step_by(2)
-                .map(|y| {
-                    let row = self.rgb.row(y);
-                    let steps = row[before].iter().zip(row[after]).map(|(a, b)| a.abs_diff(b));
-                    u32::from(steps.max().unwrap_or(0))
-                })
-                .sum();
-            if edge as f32 * weight > best {
-                (best, step) = (edge as f32 * weight, k);
+        let mut sums = [0; PLACES];
+        let before = x.wrapping_sub(1).wrapping_mul(3);
+        if self.rgb.row(y).as_flattened().get(before..before.saturating_add(READ)).is_none() {
+            for y in rows.step_by(2) {
+                let row = self.rgb.row(y);
+                let last = row.len() - 1;
+                for (x, sum) in (x..=last).zip(&mut sums) {
+                    let (before, after) = (row[x.saturating_sub(1)], row[(x + 1).min(last)]);
+                    let steps = before.iter().zip(after).map(|(a, b)| a.abs_diff(b));
+                    *sum += u16::from(steps.max().unwrap_or(0));
+                }
             }
-            weight *= INWARD;
+            return sums;
         }
-        step
+        let [mut low, mut high] = [u16x16::splat(simd, 0); 2];
+        for y in rows.step_by(2) {
+            let row = &self.rgb.row(y).as_flattened()[before..before + READ];
+            let mut most = u8x32::splat(simd, 0);
+            for channel in 0..3 {
+                let (before, after) = (load(simd, row, channel), load(simd, row, channel + 6));
+                most = most.max(abs_diff(before, after));
+            }
+            let (first, second) = most.widen();
+            low += first;
+            high += second;
+        }
+        let mut all = [0; LANES];
+        low.store_slice(&mut all[..LANES / 2]);
+        high.store_slice(&mut all[LANES / 2..]);
+        // The channels of a pixel begin with every third.
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = all[3 * i];
+        }
+        sums
     }
+}
+
+/// The step inward at which the edge is strongest.
+#[inline(always)]
+fn strongest<'a>(edges: impl Iterator<Item = &'a u16>) -> usize {
+    let (mut best, mut step, mut weight) = (0.0, 0, 1.0);
+    for (k, edge) in edges.enumerate() {
+        let edge = f32::from(*edge) * weight;
+        if edge > best {
+            (best, step) = (edge, k);
+        }
+        weight *= INWARD;
+    }
+    step
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::image::Size;
+    use crate::simd;
 
     const SIZE: Size = Size::new(40, 20);
 
@@ -132,7 +180,7 @@ mod tests {
             out.ids.row_mut(y)[10..26].fill(2);
             out.boxes[1].add(10, y, 0xffff);
         }
-        Trim { rgb: &rgb, disparity: &disparity, surface: 10.0 }.run(2, &mut out);
+        Trim { rgb: &rgb, disparity: &disparity, surface: 10.0 }.run(simd::detect(), 2, &mut out);
         let area = out.ids.pixels().iter().filter(|id| **id == 2).count();
         (out, area)
     }

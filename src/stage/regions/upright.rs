@@ -5,6 +5,7 @@ mod shrink;
 
 use super::RegionSource;
 use super::components::Candidates;
+use super::runs::run;
 use super::trim::{NARROW_M, Trim};
 use crate::image::Image;
 use crate::perception::Rejections;
@@ -12,7 +13,7 @@ use crate::simd::Level;
 use crate::stage::ground::Plane;
 use crate::stage::roi::bits::BitMask;
 use crate::stage::standing::{HIGH, Standing, Things, WIDE, size_scale};
-use paint::{Painter, run};
+use paint::Painter;
 use shrink::shrink;
 
 /// Share of a thing's cells that must be salient.
@@ -113,7 +114,8 @@ impl Upright {
                 continue;
             }
             let surface = source.rig.depth_scale() as f32 / depth;
-            Trim { rgb: source.rgb, disparity: source.disparity, surface }.run(id, out);
+            let trim = Trim { rgb: source.rgb, disparity: source.disparity, surface };
+            trim.run(self.level, id, out);
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u8x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::components::{Candidates, PixelBox, tolerance};
+use crate::stage::regions::runs::run;
 use crate::stage::roi::bits::{BitMask, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};
 
@@ -211,30 +212,6 @@ impl Painter {
     }
 }
 
-/// The first run of cells of one thing from cell `from` on.
-#[inline(always)]
-pub fn run(ids: &[u32], from: usize) -> Option<(u32, std::ops::Range<usize>)> {
-    let start = same(ids, from, 0);
-    let id = *ids.get(start)?;
-    Some((id, start..same(ids, start, id)))
-}
-
-/// The first cell from cell `from` on that does not have this id.
-#[inline(always)]
-fn same(ids: &[u32], mut from: usize, id: u32) -> usize {
-    while let Some(group) = ids[from..].first_chunk::<8>() {
-        let mut others = 0;
-        for other in group {
-            others |= other ^ id;
-        }
-        if others != 0 {
-            break;
-        }
-        from += group.len();
-    }
-    from + ids[from..].iter().take_while(|other| **other == id).count()
-}
-
 /// The values from `x` on; `beyond` where the row has ended.
 #[inline(always)]
 fn load<T: Copy>(row: &[T], x: usize, beyond: T) -> [T; LANES] {
@@ -294,17 +271,5 @@ mod tests {
         enclose(&ids, &fine, &mut holes);
         let expected = [INSIDE, INSIDE, INSIDE, INSIDE, OWN, OWN, OWN, OWN, OUTSIDE];
         assert_eq!(holes.as_chunks::<WIDE>().0, expected.map(|hole| [hole; WIDE]));
-    }
-
-    #[test]
-    fn runs_end_where_the_id_changes() {
-        let ids = [[0; 11].as_slice(), &[3; 9], &[4; 1], &[0; 2], &[4; 17]].concat();
-        let mut found = Vec::new();
-        let mut next = 0;
-        while let Some((id, cells)) = run(&ids, next) {
-            next = cells.end;
-            found.push((id, cells));
-        }
-        assert_eq!(found, [(3, 11..20), (4, 20..21), (4, 23..40)]);
     }
 }
