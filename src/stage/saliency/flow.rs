@@ -49,6 +49,7 @@ pub struct Flow {
     level: Level,
     now: [Image<u8>; LEVELS],
     before: [Image<u8>; LEVELS],
+    windows: [Windows; LEVELS],
     grid: Image<[i32; 2]>,
     next: Image<[i32; 2]>,
     block: Image<f32>,
@@ -70,6 +71,7 @@ impl Flow {
             level,
             now: Default::default(),
             before: Default::default(),
+            windows: Default::default(),
             grid: Image::default(),
             next: Image::default(),
             block: Image::default(),
@@ -86,9 +88,10 @@ impl Flow {
         pyramid(self.level, now, &mut self.now);
         self.grid.resize(Size::default());
         for level in (0..LEVELS).rev() {
-            let (now, before) = (&self.now[level], &self.before[level]);
+            let (now, windows) = (&self.now[level], &mut self.windows[level]);
+            windows.take(&self.before[level]);
             self.next.resize(now.size().divided_by(STEP));
-            dispatch!(self.level, _simd => refine(now, before, &self.grid, &mut self.next));
+            dispatch!(self.level, _simd => refine(now, windows, &self.grid, &mut self.next));
             median(&self.next, &mut self.grid);
         }
         let (size, grid) = (now.size(), &self.grid);
@@ -99,11 +102,11 @@ impl Flow {
             }
             upsample(&self.block, size, out);
         }
-        let (now, before, trust) = (&self.now[0], &self.before[0], &mut self.block);
+        let (now, before, trust) = (&self.now[0], &self.windows[0], &mut self.block);
         dispatch!(self.level, _simd => {
             for y in 0..grid.height() {
                 for (x, value) in trust.row_mut(y).iter_mut().enumerate() {
-                    let cost = cost(now, before, (x, y), grid.get(x, y));
+                    let cost = Block::new(now, x, y).and_then(|b| b.cost(before, grid.get(x, y)));
                     let mean = cost.unwrap_or(0) as f32 / AREA;
                     *value = (1.0 - (mean - SURE) / FADE).clamp(0.0, 1.0);
                 }
@@ -119,7 +122,7 @@ impl Flow {
     /// the lowest, c, it is at (l − r) / (2 (max(l, r) − c)).
     pub fn sharpen(&mut self) {
         self.blocks.resize(self.grid.size());
-        let Self { level, now: [now, ..], before: [before, ..], grid, blocks, .. } = self;
+        let Self { level, now: [now, ..], windows: [before, ..], grid, blocks, .. } = self;
         dispatch!(*level, _simd => {
             for y in 0..grid.height() {
                 for x in 0..grid.width() {
@@ -133,18 +136,19 @@ impl Flow {
 #[inline(always)]
 fn sharpened(
     now: &Image<u8>,
-    before: &Image<u8>,
-    block: (usize, usize),
+    before: &Windows,
+    (x, y): (usize, usize),
     best: [i32; 2],
 ) -> BlockShift {
     let mut out = BlockShift { shift: best.map(|shift| shift as f32), firmness: 0.0 };
-    let Some(lowest) = cost(now, before, block, best) else { return out };
+    let Some(block) = Block::new(now, x, y) else { return out };
+    let Some(lowest) = block.cost(before, best) else { return out };
     let mut rises = 0.0;
     for axis in 0..2 {
         let (mut back, mut on) = (best, best);
         back[axis] -= 1;
         on[axis] += 1;
-        let (less, more) = (cost(now, before, block, back), cost(now, before, block, on));
+        let (less, more) = (block.cost(before, back), block.cost(before, on));
         let most = less.unwrap_or(lowest).max(more.unwrap_or(lowest));
         let rise = most.saturating_sub(lowest) as f32 / AREA;
         rises += rise;
@@ -164,7 +168,7 @@ fn sharpened(
 #[inline(always)]
 fn refine(
     now: &Image<u8>,
-    before: &Image<u8>,
+    before: &Windows,
     coarser: &Image<[i32; 2]>,
     shifts: &mut Image<[i32; 2]>,
 ) {
@@ -179,8 +183,11 @@ fn refine(
                 let v = (y / 2).min(coarser.height() - 1);
                 coarser.get(u, v).map(|shift| 2 * shift)
             };
-            let mut search =
-                Search { now, before, block: (x, y), guess, best: guess, cost: u32::MAX };
+            let Some(block) = Block::new(now, x, y) else {
+                shifts.set(x, y, guess);
+                continue;
+            };
+            let mut search = Search { before, block, guess, best: guess, cost: u32::MAX };
             search.consider(guess);
             let left = if x > 0 { shifts.get(x - 1, y) } else { guess };
             let above = if y > 0 { shifts.get(x, y - 1) } else { guess };
@@ -213,9 +220,8 @@ fn refine(
 /// The search for one block's place. (Methods and no closures, which would be
 /// compiled without the wide instructions.)
 struct Search<'a> {
-    now: &'a Image<u8>,
-    before: &'a Image<u8>,
-    block: (usize, usize),
+    before: &'a Windows,
+    block: Block,
     guess: [i32; 2],
     best: [i32; 2],
     cost: u32,
@@ -224,7 +230,7 @@ struct Search<'a> {
 impl Search<'_> {
     #[inline(always)]
     fn consider(&mut self, shift: [i32; 2]) {
-        if let Some(cost) = cost(self.now, self.before, self.block, shift) {
+        if let Some(cost) = self.block.cost(self.before, shift) {
             let off = shift[0].abs_diff(self.guess[0]) + shift[1].abs_diff(self.guess[1]);
             let cost = cost + STIFFNESS * off;
             if cost < self.cost {
@@ -245,35 +251,74 @@ fn pyramid(level: Level, view: &Image<u8>, out: &mut [Image<u8>; LEVELS]) {
     }
 }
 
-/// Sum of absolute differences between a block and its shifted place; `None`
-/// where one of them is not inside the image.
-#[inline(always)]
-fn cost(
-    now: &Image<u8>,
-    before: &Image<u8>,
-    block: (usize, usize),
-    shift: [i32; 2],
-) -> Option<u32> {
-    let place = |block: usize, length: usize, shift: i32| {
-        let last = length.checked_sub(BLOCK)?;
-        // Blocks at the edge move inside.
-        let start = (block * STEP).saturating_sub((BLOCK - STEP) / 2).min(last);
-        let shifted = usize::try_from(start as i32 + shift).ok()?;
-        (shifted <= last).then_some((start, shifted))
-    };
-    let width = now.width();
-    let (x, u) = place(block.0, now.width(), shift[0])?;
-    let (y, v) = place(block.1, now.height(), shift[1])?;
-    let (now, before) = (&now.pixels()[y * width + x..], &before.pixels()[v * width + u..]);
-    let mut sum = 0;
-    for row in 0..BLOCK {
-        let a = now[row * width..].first_chunk::<BLOCK>()?;
-        let b = before[row * width..].first_chunk::<BLOCK>()?;
-        for i in 0..BLOCK {
-            sum += u32::from(a[i].abs_diff(b[i]));
+/// A block of a view.
+struct Block {
+    pixels: [u8; BLOCK * BLOCK],
+    /// Its left upper corner, and those of the last ones inside the view.
+    start: [usize; 2],
+    last: [usize; 2],
+}
+
+impl Block {
+    /// Block `(x, y)`; those at the edge move inside. `None` where the view is smaller.
+    #[inline(always)]
+    fn new(view: &Image<u8>, x: usize, y: usize) -> Option<Self> {
+        let last = [view.width().checked_sub(BLOCK)?, view.height().checked_sub(BLOCK)?];
+        let start =
+            |block: usize, last: usize| (block * STEP).saturating_sub((BLOCK - STEP) / 2).min(last);
+        let start = [start(x, last[0]), start(y, last[1])];
+        let mut pixels = [0; BLOCK * BLOCK];
+        for (i, row) in pixels.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
+            *row = *view.row(start[1] + i)[start[0]..].first_chunk()?;
+        }
+        Some(Self { pixels, start, last })
+    }
+
+    /// Sum of absolute differences between the block and its shifted place;
+    /// `None` where that is not inside the view.
+    #[inline(always)]
+    fn cost(&self, before: &Windows, shift: [i32; 2]) -> Option<u32> {
+        let x = usize::try_from(self.start[0] as i32 + shift[0]).ok()?;
+        let y = usize::try_from(self.start[1] as i32 + shift[1]).ok()?;
+        if x > self.last[0] || y > self.last[1] {
+            return None;
+        }
+        let place = before.block(x, y)?;
+        let mut sum = 0;
+        for (here, there) in self.pixels.iter().zip(place) {
+            sum += u32::from(here.abs_diff(*there));
+        }
+        Some(sum)
+    }
+}
+
+/// A view in which every block stands in one piece: of each pixel the row of
+/// [`BLOCK`] pixels that begins with it, column by column.
+#[derive(Debug, Default)]
+struct Windows {
+    height: usize,
+    rows: Vec<[u8; BLOCK]>,
+}
+
+impl Windows {
+    fn take(&mut self, view: &Image<u8>) {
+        let columns = (view.width() + 1).saturating_sub(BLOCK);
+        self.height = view.height();
+        self.rows.resize(columns * self.height, [0; BLOCK]);
+        for (y, row) in view.rows().enumerate() {
+            let places = self.rows.get_mut(y..).unwrap_or_default().iter_mut();
+            for (place, window) in places.step_by(self.height).zip(row.windows(BLOCK)) {
+                place.copy_from_slice(window);
+            }
         }
     }
-    Some(sum)
+
+    /// The block with its left upper corner at `(x, y)`, in rows.
+    #[inline(always)]
+    fn block(&self, x: usize, y: usize) -> Option<&[u8; BLOCK * BLOCK]> {
+        let rows: &[[u8; BLOCK]; BLOCK] = self.rows.get(x * self.height + y..)?.first_chunk()?;
+        rows.as_flattened().first_chunk()
+    }
 }
 
 /// Median over 3x3 blocks, each axis by itself; beyond the edge the outermost
