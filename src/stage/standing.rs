@@ -242,15 +242,23 @@ impl Standing {
         out.ids.fill(0);
         out.surface.resize(size);
         self.rows.clear();
-        self.rows.resize(size.height * out.list.len(), 0);
+        // One place more for the lower end of what reaches the lowest row.
+        let height = size.height + 1;
+        self.rows.resize(height * out.list.len(), 0);
         for (s, &thing) in self.columns.segments.iter().zip(&self.thing).filter(|(_, t)| **t != 0) {
-            let at = (thing as usize - 1) * size.height;
-            for y in s.upper..s.lower {
-                self.rows[at + y as usize] += 1;
-            }
+            // More from the upper row on, less from the lower one.
+            let rows = &mut self.rows[(thing as usize - 1) * height..][..height];
+            rows[s.upper as usize] = rows[s.upper as usize].wrapping_add(1);
+            rows[s.lower as usize] = rows[s.lower as usize].wrapping_sub(1);
         }
         self.limits.clear();
-        for rows in self.rows.chunks_exact(size.height.max(1)) {
+        for rows in self.rows.chunks_exact_mut(height) {
+            let mut cells = 0_u32;
+            for n in &mut *rows {
+                cells = cells.wrapping_add(*n);
+                *n = cells;
+            }
+            let rows = &rows[..size.height];
             let total: u32 = rows.iter().sum();
             let trim = (total as f32 * TRIM) as u32;
             let end = |rows: &mut dyn Iterator<Item = &u32>| {
@@ -276,9 +284,14 @@ impl Standing {
                 continue;
             }
             let [top, bottom] = self.limits[index];
-            for y in s.upper.max(top)..s.lower.min(bottom) {
-                out.ids.set(s.x as usize, y as usize, thing);
-                out.surface.set(s.x as usize, y as usize, s.disparity());
+            let (upper, lower) = (s.upper.max(top) as usize, s.lower.min(bottom) as usize);
+            let (at, n) = (upper * size.width + s.x as usize, lower.saturating_sub(upper));
+            let d = s.disparity();
+            for id in out.ids.pixels_mut().iter_mut().skip(at).step_by(size.width).take(n) {
+                *id = thing;
+            }
+            for at in out.surface.pixels_mut().iter_mut().skip(at).step_by(size.width).take(n) {
+                *at = d;
             }
             // A pole is seen up to its end, a trunk up to its crown.
             if out.list[index].narrow && s.top == Top::Tall {
@@ -287,7 +300,7 @@ impl Standing {
                         break;
                     }
                     out.ids.set(s.x as usize, y as usize, thing);
-                    out.surface.set(s.x as usize, y as usize, s.disparity());
+                    out.surface.set(s.x as usize, y as usize, d);
                 }
             }
         }

@@ -106,20 +106,34 @@ impl Contour {
 
 /// The first pixel from column `from` of a row on whose western neighbour is outside.
 fn next_western_end(row: &[u8], from: usize) -> Option<usize> {
-    let word = |x: usize| row[x..].first_chunk().map(|bytes| u64::from_ne_bytes(*bytes));
+    let word = |x: usize| row[x..].first_chunk().map(|bytes| u64::from_le_bytes(*bytes));
     let mut x = from;
     while x < row.len() {
         let west = x.checked_sub(1);
         if row[x] != 0 && west.is_none_or(|west| row[west] == 0) {
             return Some(x);
         }
-        // Eight pixels at once of which each is outside or follows one inside.
-        let none = west
-            .and_then(|west| Some(word(x)? & !word(west)?))
-            .is_some_and(|western_ends| western_ends == 0);
-        x += if none { 8 } else { 1 };
+        let ends = west.and_then(|west| Some(word(x)? & !word(west)?));
+        x += match (west, ends) {
+            // Many pixels at once of which each is outside or follows one inside.
+            (Some(west), Some(0)) if follows(&row[west..]) => GROUP,
+            (_, Some(0)) => 8,
+            (_, Some(ends)) => (ends.trailing_zeros() as usize / 8).max(1),
+            (_, None) => 1,
+        };
     }
     None
+}
+
+/// Pixels that are looked at together.
+const GROUP: usize = 64;
+
+/// Whether each of as many pixels from the second on is outside or follows one inside.
+fn follows(row: &[u8]) -> bool {
+    let (Some(west), Some(here)) = (row.first_chunk::<GROUP>(), row.get(1..=GROUP)) else {
+        return false;
+    };
+    west.iter().zip(here).fold(0, |ends, (west, here)| ends | (here & !west)) == 0
 }
 
 /// True where the neighbours to the west and to the north are all outside, as

@@ -29,7 +29,7 @@ const SINK_M: f32 = 0.15;
 /// behind a bonnet), metres.
 const SETBACK_M: f32 = 1.5;
 /// Cells without disparity between such parts.
-const MAX_HOLES: usize = 2;
+const MAX_HOLES: u32 = 2;
 
 /// The joining of segments, with its buffers.
 #[derive(Debug, Default)]
@@ -142,12 +142,13 @@ impl Join {
             let mut best = (f32::INFINITY, None);
             let from = first[column.saturating_sub(1)] as usize;
             let to = first[(column + 2).min(first.len() - 1)] as usize;
-            for (j, t) in (from..to).zip(&segments[from..to]) {
-                let (place, other) = (&self.places[i], &self.places[j]);
+            let place = &self.places[i];
+            for (j, other) in (from..to).zip(&self.places[from..to]) {
                 let step = (place.distance - other.distance).abs();
                 if j == i || step >= best.0 || !(self.strong[j] || j < i) {
                     continue;
                 }
+                let t = &segments[j];
                 let touches = if t.x == s.x {
                     view.above((s, place), (t, other)) || view.above((t, other), (s, place))
                 } else {
@@ -249,7 +250,7 @@ impl View {
     fn above(&self, lower: (&Segment, &Place), upper: (&Segment, &Place)) -> bool {
         let setback = upper.1.distance - lower.1.distance;
         let (lower, upper) = (lower.0, upper.0);
-        let near = lower.upper.abs_diff(upper.lower) as usize <= MAX_HOLES;
+        let near = lower.upper.abs_diff(upper.lower) <= MAX_HOLES;
         // A surface that only leans back rises on the way; what begins lower
         // than the edge in front of it is something else behind it.
         let rises = upper.bottom_m >= lower.top_m - SINK_M * self.scale;
