@@ -111,6 +111,31 @@ struct Vote {
     strip: usize,
 }
 
+/// Every few of the votes, field by field, so that a plane is held against
+/// several at once.
+#[derive(Debug, Default)]
+struct Sample {
+    u: Vec<f32>,
+    v: Vec<f32>,
+    d: Vec<f32>,
+    strip: Vec<usize>,
+}
+
+impl Sample {
+    fn take(&mut self, votes: &[Vote]) {
+        self.strip.clear();
+        for field in [&mut self.u, &mut self.v, &mut self.d] {
+            field.clear();
+        }
+        for Vote { cell, strip } in votes.iter().step_by(SKIP) {
+            self.u.push(cell.u);
+            self.v.push(cell.v);
+            self.d.push(cell.d);
+            self.strip.push(*strip);
+        }
+    }
+}
+
 /// The estimator of the ground plane, with its memory of the last one.
 #[derive(Debug, Default)]
 pub struct Ground {
@@ -118,6 +143,7 @@ pub struct Ground {
     state: GroundState,
     failures: u32,
     votes: Vec<Vote>,
+    sample: Sample,
     /// Disparities of the plane where cells lie on it.
     seen: Vec<f32>,
 }
@@ -195,6 +221,7 @@ impl Ground {
             }
             i += step;
         }
+        self.sample.take(&self.votes);
     }
 
     /// The best of the last plane and of planes through triples of votes.
@@ -234,16 +261,22 @@ impl Ground {
     /// strips where that is positive.
     fn score(&self, plane: &Plane) -> f32 {
         let mut scores = [0.0_f32; STRIPS];
-        for vote in self.votes.iter().step_by(SKIP) {
-            let at = plane.disparity(vote.cell.u, vote.cell.v);
-            let difference = vote.cell.d - at;
-            let tolerance = tolerance(at);
-            // Far away everything is near the plane: such votes count less.
-            let weight = (at / 8.0).clamp(0.0, 1.0);
-            if difference.abs() < tolerance {
-                scores[vote.strip] += weight * (1.0 - (difference / tolerance).powi(2));
-            } else if difference < 0.0 && at > 1.0 {
-                scores[vote.strip] -= 0.7 * weight;
+        let Sample { u, v, d, strip } = &self.sample;
+        let mut votes = [0.0_f32; 64];
+        let fields = u.chunks(votes.len()).zip(v.chunks(votes.len())).zip(d.chunks(votes.len()));
+        for (((u, v), d), strip) in fields.zip(strip.chunks(votes.len())) {
+            for ((vote, d), (u, v)) in votes.iter_mut().zip(d).zip(u.iter().zip(v)) {
+                let at = plane.disparity(*u, *v);
+                let difference = d - at;
+                let tolerance = tolerance(at);
+                // Far away everything is near the plane: such votes count less.
+                let weight = (at / 8.0).clamp(0.0, 1.0);
+                let on = weight * (1.0 - (difference / tolerance).powi(2));
+                let below = if difference < 0.0 && at > 1.0 { -0.7 * weight } else { 0.0 };
+                *vote = if difference.abs() < tolerance { on } else { below };
+            }
+            for (strip, vote) in strip.iter().zip(votes) {
+                scores[*strip] += vote;
             }
         }
         scores.iter().map(|score| score.max(0.0)).sum()

@@ -114,8 +114,8 @@ impl Roi {
             self.dilate();
             self.keep_budget(attention);
         }
-        self.salient.write(&mut out.salient);
-        self.matched.write(&mut out.matched);
+        self.salient.write(self.level, &mut out.salient);
+        self.matched.write(self.level, &mut out.matched);
         out.fraction = self.area as f32 / self.size.area().max(1) as f32;
     }
 

@@ -32,7 +32,7 @@ fn bits(mask: &Mask) -> BitMask {
 
 fn flags(bits: &BitMask) -> Mask {
     let mut bytes = Image::default();
-    bits.write(&mut bytes);
+    bits.write(simd::detect(), &mut bytes);
     assert_eq!(bits.count(), set_pixels(&bytes));
     assert!(bytes.pixels().iter().all(|&v| v == 0 || v == 255));
     of(&bytes)

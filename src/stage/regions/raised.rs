@@ -77,9 +77,9 @@ impl Raised {
         self.high.set_from(self.level, &self.relief, RELIEF_PX);
         self.high.open(OPENING);
         self.high.close(CLOSING);
-        self.high.write(&mut self.mask);
+        self.high.write(self.level, &mut self.mask);
         self.high.dilate(REACH);
-        self.high.write(&mut self.near);
+        self.high.write(self.level, &mut self.near);
         for y in 0..size.height {
             let known = self.relief.row(y).iter().zip(source.roi.salient.row(y));
             let row = self.mask.row_mut(y).iter_mut().zip(self.near.row(y)).zip(known);

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use crate::simd::{Level, Simd, dispatch, f32x16, mask8x64, prelude::*, u8x64};
 
 /// Pixels per word; pixel `x` of a row is bit `x % 64` of its word `x / 64`.
 const WORD: usize = u64::BITS as usize;
@@ -88,26 +88,17 @@ impl BitMask {
     }
 
     /// Writes 255 for set bits and 0 for others.
-    pub fn write(&self, out: &mut Image<u8>) {
+    pub fn write(&self, level: Level, out: &mut Image<u8>) {
         out.resize(self.size);
         if self.size.is_empty() {
             return;
         }
         let rows = self.words.par_chunks_exact(self.stride);
-        out.pixels_mut().par_chunks_exact_mut(self.size.width).zip(rows).with_min_len(64).for_each(
-            |(row, words)| {
-                let (whole, cut) = row.as_chunks_mut::<WORD>();
-                for (values, word) in whole.iter_mut().zip(words) {
-                    let (eights, _) = values.as_chunks_mut::<8>();
-                    for (values, byte) in eights.iter_mut().zip(word.to_le_bytes()) {
-                        *values = SPREAD[usize::from(byte)].to_le_bytes();
-                    }
-                }
-                for (bit, value) in cut.iter_mut().enumerate() {
-                    *value = if words[whole.len()] >> bit & 1 == 1 { 255 } else { 0 };
-                }
-            },
-        );
+        out.pixels_mut()
+            .par_chunks_exact_mut(self.size.width)
+            .zip(rows)
+            .with_min_len(64)
+            .for_each(|(row, words)| dispatch!(level, simd => write_row(simd, words, row)));
     }
 
     /// Sets every pixel that has a set pixel within `radius` rows and columns.
@@ -267,22 +258,19 @@ pub fn last_set(words: &[u64], to: usize) -> Option<usize> {
     Some(index * WORD + WORD - 1 - word.leading_zeros() as usize)
 }
 
-/// For each byte eight pixels: 255 where its bit is set.
-const SPREAD: [u64; 256] = {
-    let mut table = [0; 256];
-    let mut byte = 0;
-    while byte < 256 {
-        let mut bit = 0;
-        while bit < 8 {
-            if byte >> bit & 1 == 1 {
-                table[byte] |= 0xff << (8 * bit);
-            }
-            bit += 1;
+/// 255 for each set bit of `words`.
+#[inline(always)]
+fn write_row<S: Simd>(simd: S, words: &[u64], row: &mut [u8]) {
+    let (none, all) = (u8x64::splat(simd, 0), u8x64::splat(simd, u8::MAX));
+    for (word, pixels) in words.iter().zip(row.chunks_mut(WORD)) {
+        let values = mask8x64::from_bitmask(simd, *word).select(all, none);
+        if pixels.len() == WORD {
+            values.store_slice(pixels);
+        } else {
+            pixels.copy_from_slice(&values.as_slice()[..pixels.len()]);
         }
-        byte += 1;
     }
-    table
-};
+}
 
 #[cfg(test)]
 mod tests {

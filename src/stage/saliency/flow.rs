@@ -52,6 +52,7 @@ pub struct Flow {
     windows: [Windows; LEVELS],
     grid: Image<[i32; 2]>,
     next: Image<[i32; 2]>,
+    rows: [Vec<[i32; 2]>; 3],
     block: Image<f32>,
     /// One per 4x4 pixels: see [`Flow::sharpen`].
     pub blocks: Image<BlockShift>,
@@ -74,6 +75,7 @@ impl Flow {
             windows: Default::default(),
             grid: Image::default(),
             next: Image::default(),
+            rows: Default::default(),
             block: Image::default(),
             blocks: Image::default(),
             dx: Image::default(),
@@ -92,7 +94,8 @@ impl Flow {
             windows.take(&self.before[level]);
             self.next.resize(now.size().divided_by(STEP));
             dispatch!(self.level, _simd => refine(now, windows, &self.grid, &mut self.next));
-            median(&self.next, &mut self.grid);
+            let Self { next, rows, grid, .. } = self;
+            dispatch!(self.level, _simd => median(next, rows, grid));
         }
         let (size, grid) = (now.size(), &self.grid);
         self.block.resize(grid.size());
@@ -322,27 +325,41 @@ impl Windows {
 }
 
 /// Median over 3x3 blocks, each axis by itself; beyond the edge the outermost
-/// blocks continue.
-fn median(shifts: &Image<[i32; 2]>, out: &mut Image<[i32; 2]>) {
+/// blocks continue. `rows` is a buffer.
+#[inline(always)]
+fn median(shifts: &Image<[i32; 2]>, rows: &mut [Vec<[i32; 2]>; 3], out: &mut Image<[i32; 2]>) {
     let Size { width, height } = shifts.size();
     out.resize(shifts.size());
+    if shifts.size().is_empty() {
+        return;
+    }
     for y in 0..height {
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| shifts.row(y));
-        for (x, out) in out.row_mut(y).iter_mut().enumerate() {
-            let columns = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
-            for (axis, out) in out.iter_mut().enumerate() {
-                // As in the median of an image: see `preprocess::denoise`.
-                let [[l0, m0, h0], [l1, m1, h1], [l2, m2, h2]] =
-                    columns.map(|x| sorted(rows.map(|row| row[x][axis])));
-                let low = l0.max(l1).max(l2);
-                let high = h0.min(h1).min(h2);
-                *out = sorted([low, sorted([m0, m1, m2])[1], high])[1];
-            }
+        for (row, y) in rows.iter_mut().zip([y.saturating_sub(1), y, (y + 1).min(height - 1)]) {
+            let shifts = shifts.row(y);
+            row.clear();
+            row.extend(shifts.first());
+            row.extend_from_slice(shifts);
+            row.extend(shifts.last());
+        }
+        // Axes side by side: the next block is two numbers further on.
+        let [above, here, below] = rows.each_ref().map(|row| row.as_flattened());
+        let n = 2 * width;
+        let (above, here, below) = (&above[..n + 4], &here[..n + 4], &below[..n + 4]);
+        let out = &mut out.row_mut(y).as_flattened_mut()[..n];
+        for i in 0..n {
+            // As in the median of an image: see `preprocess::denoise`.
+            let [l0, m0, h0] = sorted([above[i], here[i], below[i]]);
+            let [l1, m1, h1] = sorted([above[i + 2], here[i + 2], below[i + 2]]);
+            let [l2, m2, h2] = sorted([above[i + 4], here[i + 4], below[i + 4]]);
+            let low = l0.max(l1).max(l2);
+            let high = h0.min(h1).min(h2);
+            out[i] = sorted([low, sorted([m0, m1, m2])[1], high])[1];
         }
     }
 }
 
 /// Three values in ascending order.
+#[inline(always)]
 fn sorted([a, b, c]: [i32; 3]) -> [i32; 3] {
     let (low, high) = (a.min(b), a.max(b));
     let (middle, high) = (high.min(c), high.max(c));
