@@ -197,15 +197,19 @@ impl Barrier {
         for i in 0..steps {
             let step = if FORWARD { i } else { steps - 1 - i };
             // The cell that lies in the next band.
-            let (beside, at) = if FORWARD {
-                let above = band.checked_sub(1).map(|above| above * steps + step + ROWS - 1);
-                (above.filter(|_| step + ROWS - 1 < steps), LAST)
+            let beside = if FORWARD {
+                let inside = band > 0 && step + ROWS - 1 < steps;
+                if inside { Some((band - 1) * steps + step + ROWS - 1) } else { None }
             } else {
-                let below = step.checked_sub(ROWS - 1).map(|x| (band + 1) * steps + x);
-                (below.filter(|_| band + 1 < self.bands()), 0)
+                let inside = band + 1 < self.bands() && step + 1 >= ROWS;
+                if inside { Some((band + 1) * steps + step + 1 - ROWS) } else { None }
             };
-            let beside = beside.and_then(|i| Some((self.high.get(i)?, self.low.get(i)?)));
-            let (high, low) = beside.map_or((u32::MAX, 0), |(h, l)| (cell(h, at), cell(l, at)));
+            let at = if FORWARD { LAST } else { 0 };
+            let (high, low) = if let Some(i) = beside {
+                (cell(&self.high[i], at), cell(&self.low[i], at))
+            } else {
+                (u32::MAX, 0)
+            };
             let (high, low) = (u32x16::splat(simd, high), u32x16::splat(simd, low));
             let [up, down]: [u32x16<S>; 2] = [last.high.bitcast(), last.low.bitcast()];
             let upright = if FORWARD {

@@ -95,8 +95,8 @@ fn smooth<S: Simd, const KEPT: bool>(
     let size = attention.size();
     for y in 0..size.height {
         for x in (0..size.width).step_by(LANES) {
-            let [dx, dy, trust] = [&flow.dx, &flow.dy, &flow.trust].map(|map| map.row(y));
-            let (dx, dy, trust) = (load(simd, dx, x), load(simd, dy, x), load(simd, trust, x));
+            let (dx, dy) = (load(simd, flow.dx.row(y), x), load(simd, flow.dy.row(y), x));
+            let trust = load(simd, flow.trust.row(y), x);
             let here = f32x16::from_fn(simd, |i| (x + i) as f32);
             let place = Place::new(size, here + dx, dy + y as f32);
             let now = load(simd, attention.row(y), x);
@@ -156,20 +156,29 @@ impl<S: Simd> Place<S> {
     /// is right of the last column or below the last row has no share.
     #[inline(always)]
     fn of(&self, simd: S, pixels: &[f32]) -> f32x16<S> {
-        let pair = |at: usize| pixels[at..].first_chunk().copied().unwrap_or([pixels[at]; 2]);
         let [mut upper, mut lower] = [[[0.0; 2]; LANES]; 2];
         for (i, at) in self.at.as_slice().iter().enumerate() {
             let (at, below) = (*at as usize, *at as usize + self.width);
-            upper[i] = pair(at);
-            lower[i] = if below < pixels.len() { pair(below) } else { upper[i] };
+            upper[i] = pair(pixels, at);
+            lower[i] = if below < pixels.len() { pair(pixels, below) } else { upper[i] };
         }
-        let across = |pairs: &[[f32; 2]; LANES]| {
-            let (first, second) = pairs.as_flattened().split_at(LANES);
-            let first = f32x16::from_slice(simd, first);
-            let (from, to) = first.deinterleave(f32x16::from_slice(simd, second));
-            from + self.fx * (to - from)
-        };
-        let (upper, lower) = (across(&upper), across(&lower));
+        let upper = self.across(simd, &upper);
+        let lower = self.across(simd, &lower);
         upper + self.fy * (lower - upper)
     }
+
+    /// Between the two of each pair.
+    #[inline(always)]
+    fn across(&self, simd: S, pairs: &[[f32; 2]; LANES]) -> f32x16<S> {
+        let (first, second) = pairs.as_flattened().split_at(LANES);
+        let first = f32x16::from_slice(simd, first);
+        let (from, to) = first.deinterleave(f32x16::from_slice(simd, second));
+        from + self.fx * (to - from)
+    }
+}
+
+/// A pixel and the next one; twice the last one.
+#[inline(always)]
+fn pair(pixels: &[f32], at: usize) -> [f32; 2] {
+    if let Some(pair) = pixels[at..].first_chunk() { *pair } else { [pixels[at]; 2] }
 }

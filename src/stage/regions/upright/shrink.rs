@@ -65,7 +65,8 @@ impl Row<'_> {
             let coarse: [f32; LANES] = group(self.coarse, i * COARSE, f32::NAN);
             let coarse = f32x16::from_slice(simd, &coarse) - self.offset;
             let mut values = coarse.zip_low(coarse);
-            let matched = cells_of(simd, self.matched.map(|row| group(row, x, 0)));
+            let [upper, lower] = self.matched;
+            let matched = cells_of(simd, group(upper, x, 0), group(lower, x, 0));
             if matched != 0 {
                 let medians = medians_of(simd, &self.disparity, x);
                 let known = medians.simd_eq(medians).to_bitmask() & matched;
@@ -83,7 +84,7 @@ impl Row<'_> {
 
 /// One bit for each cell of which a pixel of one of two rows is not 0.
 #[inline(always)]
-fn cells_of<S: Simd>(simd: S, [upper, lower]: [[u8; PIXELS]; 2]) -> u64 {
+fn cells_of<S: Simd>(simd: S, upper: [u8; PIXELS], lower: [u8; PIXELS]) -> u64 {
     let any = u8x32::from_slice(simd, &upper) | u8x32::from_slice(simd, &lower);
     let bits = !any.simd_eq(u8x32::splat(simd, 0)).to_bitmask();
     // The even bits move together.
