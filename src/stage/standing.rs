@@ -35,11 +35,21 @@ const MOST_WIDE: usize = 6;
 /// Share of a thing's sides that must be free of anything nearer.
 const LEAST_FREE: f32 = 0.3;
 
+/// Width in metres from which what does not reach the ground may be a plate on a post
+/// too thin to be seen: a traffic sign, which is as large on every road. It is no
+/// wider than a trunk or a pole may be.
+const PLATE_M: f32 = 0.3;
+/// Share of its sides, of so many cells at least, behind which it is farther away.
+const PLATE_FREE: f32 = 0.8;
+const PLATE_SIDES: u32 = 4;
+
 /// One thing on the ground.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Thing {
     /// Number of cells.
     pub cells: u32,
+    /// Cells above those, of surfaces that end below a lorry's height.
+    above: u32,
     /// Left and right end in the camera's frame, metres.
     pub lateral_m: [f32; 2],
     /// Height of its highest cell above the ground, metres.
@@ -57,6 +67,8 @@ pub struct Thing {
     hidden: u32,
     /// As narrow as a trunk or a pole.
     narrow: bool,
+    /// Held up by a post that is not seen.
+    plate: bool,
 }
 
 impl Thing {
@@ -71,7 +83,8 @@ impl Thing {
 
     fn is_large(&self, scale: f32, least_cells: u32) -> bool {
         let low = (LEAST_TOP_M * scale).max(LEAST_RISE * self.size_m()[0]);
-        self.cells >= least_cells && self.top_m >= low
+        let above = if self.stands() { 0 } else { self.above };
+        self.cells + above >= least_cells && self.top_m >= low
     }
 
     fn stands(&self) -> bool {
@@ -83,8 +96,19 @@ impl Thing {
         width.max(depth) <= TRUNK_M
     }
 
+    fn goes_on(&self) -> bool {
+        self.part(self.tall + self.covered) > MOST_TALL
+    }
+
     fn is_building(&self) -> bool {
-        !self.is_narrow() && self.part(self.tall + self.covered) > MOST_TALL
+        !self.is_narrow() && self.goes_on()
+    }
+
+    fn is_plate(&self) -> bool {
+        let sides = self.free + self.hidden;
+        let apart = sides >= PLATE_SIDES && self.free as f32 >= PLATE_FREE * sides as f32;
+        let wide = self.size_m()[0] >= PLATE_M;
+        !self.stands() && self.is_narrow() && wide && !self.goes_on() && apart
     }
 
     fn is_behind(&self) -> bool {
@@ -179,6 +203,7 @@ impl Standing {
             let z = depth_scale / s.disparity();
             let left = (s.x as f32 * WIDE as f32 - 0.5 - cx) * z / focal;
             t.cells += s.cells;
+            t.above += if s.top == Top::Tall { 0 } else { s.upper.saturating_sub(s.reach) };
             t.columns += 1;
             t.contacts += u32::from(s.contact);
             t.tall += u32::from(s.top == Top::Tall);
@@ -194,12 +219,13 @@ impl Standing {
         let mut kept = 0;
         for i in 0..out.list.len() {
             let thing = out.list[i];
-            let (large, stands) = (thing.is_large(scale, least_cells), thing.stands());
+            let plate = thing.is_plate();
+            let (large, stands) = (thing.is_large(scale, least_cells), plate || thing.stands());
             let background = thing.is_building() || thing.is_behind();
             out.floating += u32::from(large && !stands);
             out.background += u32::from(large && stands && background);
             if large && stands && !background {
-                out.list[kept] = Thing { narrow: thing.is_narrow(), ..thing };
+                out.list[kept] = Thing { narrow: thing.is_narrow(), plate, ..thing };
                 kept += 1;
                 self.seen.push(kept as u32);
             } else {
@@ -222,7 +248,8 @@ impl Standing {
     ) {
         self.seen.clear();
         self.seen.extend(things.iter().map(|thing| {
-            let asked = thing.is_large(scale, least_cells) && thing.stands();
+            let stands = thing.stands() || thing.is_narrow();
+            let asked = thing.is_large(scale, least_cells) && stands;
             u32::from(asked && !thing.is_building())
         }));
         for (s, &thing) in self.columns.segments.iter().zip(&self.thing) {
@@ -293,10 +320,11 @@ impl Standing {
             for at in out.surface.pixels_mut().iter_mut().skip(at).step_by(size.width).take(n) {
                 *at = d;
             }
-            // A pole is seen up to its end, a trunk up to its crown.
-            if out.list[index].narrow && s.top == Top::Tall {
+            // A pole is seen up to its end, a trunk up to its crown, a plate wholly.
+            let Thing { narrow, plate, .. } = out.list[index];
+            if plate || narrow && s.top == Top::Tall {
                 for y in (s.reach..s.upper.min(bottom)).rev() {
-                    if width(disparity, s, y) > MOST_WIDE {
+                    if !plate && width(disparity, s, y) > MOST_WIDE {
                         break;
                     }
                     out.ids.set(s.x as usize, y as usize, thing);

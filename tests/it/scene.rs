@@ -240,6 +240,24 @@ fn what_stands_is_found_and_what_floats_is_counted() {
 }
 
 #[test]
+fn a_sign_on_a_post_that_is_not_seen_is_a_thing_up_to_its_top() {
+    let at = |things: &Things, x: f64, height: f64| {
+        let (u, v) = (320.0 + F * x / 10.0, HORIZON + F * (HEIGHT - height) / 10.0);
+        things.ids.get(u as usize / standing::WIDE, v as usize / standing::HIGH)
+    };
+    let sign = [1.7, 2.3, 2.0, 2.9, 10.0];
+    let found = things(&upright(&[sign]));
+    assert_eq!((found.list.len(), found.floating), (1, 0));
+    assert_eq!((at(&found, 2.0, 2.1), at(&found, 2.0, 2.8)), (1, 1));
+    assert_eq!((at(&found, 2.0, 1.6), at(&found, 1.5, 2.4)), (0, 0));
+    // One on a wall just behind it is none, and one that something nearer covers at a side.
+    let wall = [-3.0, 6.0, 1.5, 3.5, 10.3];
+    assert_eq!(at(&things(&upright(&[sign, wall])), 2.0, 2.3), 0);
+    let nearer = [1.2, 1.55, 0.0, 6.0, 8.0];
+    assert_eq!(at(&things(&upright(&[sign, nearer])), 2.1, 2.3), 0);
+}
+
+#[test]
 fn parked_cars_are_two_and_the_house_behind_them_is_none() {
     // Two cars one behind the other, and a house front that goes up out of the picture.
     let boxes =
