@@ -78,13 +78,21 @@ impl Adjoin {
                 self.edges.push((u64::from(a) << 32) | u64::from(b));
             }
         };
-        for y in 0..ids.height() {
-            let row = ids.row(y);
+        // All outlines lie in the box of all boxes, with a border of one.
+        let mut all = PixelBox::NONE;
+        for b in boxes.iter().filter(|b| b.area > 0) {
+            (all.x0, all.x1) = (all.x0.min(b.x0), all.x1.max(b.x1));
+            (all.y0, all.y1) = (all.y0.min(b.y0), all.y1.max(b.y1));
+        }
+        let columns = all.x0.saturating_sub(1)..(all.x1 + 1).min(ids.width());
+        let rows = all.y0.saturating_sub(1)..(all.y1 + 1).min(ids.height());
+        for y in rows.clone() {
+            let row = &ids.row(y)[columns.clone()];
             for pair in row.windows(2) {
                 border(pair[0], pair[1]);
             }
-            if y + 1 < ids.height() {
-                for (&above, &below) in row.iter().zip(ids.row(y + 1)) {
+            if y + 1 < rows.end {
+                for (&above, &below) in row.iter().zip(&ids.row(y + 1)[columns.clone()]) {
                     border(above, below);
                 }
             }
