@@ -41,6 +41,8 @@ def lay_out(clip, root):
         frames, labels, things = images_of(clip / "rgb"), images_of(clip / "mask" / "01"), range(128, 256)
     else:
         return False
+    if len(frames) != len(labels):
+        sys.exit(f"{clip}: {len(frames)} frames, but {len(labels)} masks")
     for folder in (IMAGES, MASKS):
         (root / folder / clip.name).mkdir(parents=True)
     for number, (frame, label) in enumerate(zip(frames, labels)):
@@ -83,6 +85,8 @@ def main():
                 skipped = [clip.name for clip in sorted(folder.iterdir()) if clip.is_dir() and not lay_out(clip, root)]
                 if skipped:
                     print(f"{folder}: no clip in {', '.join(skipped)}", file=sys.stderr)
+            if not (root / IMAGES).is_dir():
+                sys.exit(f"{folder}: neither DAVIS nor clips")
             clips += [(root, sequence.name) for sequence in sorted((root / IMAGES).iterdir())]
         for number, (root, clip) in enumerate(clips):
             figures, frames = measured(args.tool, root, clip, work / f"measured{number}")

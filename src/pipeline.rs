@@ -18,9 +18,10 @@ use crate::stage::track::{self, Track};
 
 /// The stages and their buffers for pictures of one size.
 ///
-/// Two registers look back in time: `previous` and `track`. With a time budget
-/// `latency` does so as well, and what is matched depends on the machine.
-/// Everything else depends on the current frame alone.
+/// Two registers look back in time: `previous` and `track`; beside them mode `scene`
+/// keeps its plane and how much moved lately, which start anew when `previous` does.
+/// With a time budget `latency` looks back as well, and what is matched depends on
+/// the machine. Everything else depends on the current frame alone.
 pub struct Pipeline {
     preprocess: Preprocess,
     coarse: Coarse,

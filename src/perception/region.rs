@@ -159,7 +159,8 @@ impl DerefMut for RegionList {
 pub struct Rejections {
     /// Fewer pixels than `regions.min_area`.
     pub small_area: u32,
-    /// Mean confidence too low, or too few valid disparities.
+    /// Mean confidence of the disparities too low, too few of them, or on a plane
+    /// too little probability to be a thing.
     pub low_confidence: u32,
     /// Disparities that do not form one object.
     pub inconsistent_depth: u32,

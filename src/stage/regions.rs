@@ -15,7 +15,7 @@ pub mod upright;
 use rayon::prelude::*;
 
 use crate::camera::StereoRig;
-use crate::config::Config;
+use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
 use crate::perception::{Region, RegionList, Rejections, RoiMask};
 use crate::simd::Level;
@@ -84,6 +84,8 @@ pub struct Regions {
     size: Size,
     min_area: usize,
     max_count: usize,
+    /// In mode `scene`, where attention tells what matters without a plane.
+    weighs: bool,
     contour_tolerance: f32,
     components: Components,
     upright: Upright,
@@ -112,6 +114,7 @@ impl Regions {
             size,
             min_area: usize::try_from(config.regions.min_area).unwrap_or(1),
             max_count: usize::try_from(config.regions.max_count).unwrap_or(1),
+            weighs: config.saliency.mode == SaliencyMode::Scene,
             contour_tolerance: config.regions.contour_tolerance as f32,
             components: Components::default(),
             upright: Upright::new(level),
@@ -133,11 +136,12 @@ impl Regions {
     ) {
         regions.clear();
         *rejections = Rejections::default();
+        let mut joined = 0;
         if let Some(plane) = source.plane {
             let area = self.min_area;
             self.upright.run(plane, source, area, &mut self.candidates, rejections);
         } else if let Some(plane) = source.table {
-            self.raised.run(plane, source, &mut self.components, &mut self.candidates);
+            joined = self.raised.run(plane, source, &mut self.components, &mut self.candidates);
         } else {
             self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
         }
@@ -150,6 +154,8 @@ impl Regions {
                 regions.push_empty();
             }
         }
+        // They left an empty box.
+        rejections.small_area -= joined;
         self.measure(source, regions);
         let mut evidence = self.evidence.iter();
         let on_plane = source.plane.or(source.table).is_some();
@@ -158,7 +164,7 @@ impl Regions {
             let count = evidence.next().and_then(|e| refusal(e, region, least, rejections));
             count.map(|count| *count += 1).is_none()
         });
-        if source.plane.is_none() && source.table.is_none() {
+        if self.weighs && source.plane.is_none() && source.table.is_none() {
             retain_weighty(regions, rejections);
         }
         regions.sort_unstable_by(|a, b| {

@@ -74,6 +74,48 @@ fn motion(
 }
 
 #[test]
+fn what_moves_at_the_edge_is_seen_where_blocks_are_cut() {
+    // The last blocks of 158 x 90 cells have their middles beyond the view.
+    let cells = Size::new(158, 90);
+    let frame = |thing: f64, camera: f64| {
+        Image::from_fn(cells, |x, y| {
+            let (x, y) = (x as f64, y as f64);
+            let dx = if x >= 126.0 && y >= 58.0 { thing } else { camera };
+            texture(x + dx, y) as u8
+        })
+    };
+    let seen = |now: &Image<u8>| {
+        let before = frame(0.0, 0.0);
+        let full = Size::new(4 * cells.width, 4 * cells.height);
+        let camera = |shift| Camera::pinhole(full, F, 316.0, 180.0, shift);
+        let rig = StereoRig::new(camera(0.0), camera(-0.5 * F), 0.0).unwrap();
+        let coarse = CoarseDisparity { checked: Image::new(cells), filled: Image::new(cells) };
+        let view = View { gray: now.clone(), ..View::default() };
+        let mut flow = Flow::new(simd::detect());
+        flow.run(&before, now);
+        flow.sharpen();
+        let scene = AttentionScene {
+            stamp: Stamp::default(),
+            left: &view,
+            cells: &view,
+            coarse: &coarse,
+            rig: &rig,
+            previous: None,
+            flow: Some(&flow),
+        };
+        let mut ego = EgoMotion::new(simd::detect());
+        assert!(ego.run(&flow, &scene, false));
+        [ego.motion.get(156, 74), ego.motion.get(142, 88)]
+    };
+    // The camera rests, and the thing in the corner does not.
+    let [right, below] = seen(&frame(-3.0, 0.0));
+    assert!(right > 0.4 && below > 0.4, "{right} {below}");
+    // The camera pans, and what comes into view at the right was not seen before.
+    let [right, _] = seen(&frame(6.0, 6.0));
+    assert_eq!(right, 0.0);
+}
+
+#[test]
 fn what_movers_moved_is_remembered_a_while() {
     let thing = |x: f64, y: f64| (60.0..92.0).contains(&x) && (36.0..64.0).contains(&y);
     let before = frame(|_, _| (0.0, 0.0));

@@ -568,6 +568,32 @@ fn what_was_attended_to_stays_a_little_and_marks_itself() {
 }
 
 #[test]
+fn after_a_reset_mode_scene_knows_nothing_of_what_moved() {
+    let size = Size::new(331, 245);
+    let world = |at: f64| {
+        let (rest, moved) = (texture(size, 0.0, 0.0), texture(size, at, 0.0));
+        World::new(Image::from_fn(size, |x, y| {
+            let inside = (100..200).contains(&x) && (60..180).contains(&y);
+            [if inside { &moved } else { &rest }.get(x, y); 3]
+        }))
+    };
+    let (before, after, later) = (world(0.0), world(9.0), world(1.0));
+    let config = config(SaliencyMode::Scene);
+    let mut used = Saliency::new(&config, size, simd::detect());
+    let mut previous = Previous::default();
+    run(&mut used, &mut previous, &before.left, &before.coarse);
+    let (moving, _) = run(&mut used, &mut previous, &after.left, &after.coarse);
+    previous.clear();
+    let mut new = Saliency::new(&config, size, simd::detect());
+    let mut empty = Previous::default();
+    for world in [&after, &after, &later] {
+        let found = run(&mut used, &mut previous, &world.left, &world.coarse);
+        assert_eq!(found, run(&mut new, &mut empty, &world.left, &world.coarse));
+        assert_ne!(found.0, moving);
+    }
+}
+
+#[test]
 fn any_number_of_threads_gives_the_same_bytes() {
     let size = Size::new(501, 203);
     let (one, two) = (World::noise(size, 17), World::noise(size, 18));

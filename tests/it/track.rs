@@ -94,6 +94,26 @@ fn person(x: f64, z: f64) -> Thing {
 }
 
 #[test]
+fn a_prediction_needs_most_of_its_pixels() {
+    // The right part of the view lies farther: so much of a person at 8 m is left.
+    for (left, published) in [(0.95, true), (0.65, false), (0.3, false)] {
+        let mut driver = Driver::new(&Config::default());
+        let mut at = 0..0;
+        for frame in 0..5 {
+            let list = driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
+            at = list[0].x as usize..(list[0].x + list[0].width) as usize;
+        }
+        let end = at.start + (left * at.len() as f64) as usize;
+        for y in 0..SIZE.height {
+            for (x, d) in driver.disparity.row_mut(y).iter_mut().enumerate() {
+                *d = if x < end { 25.0 } else { 12.0 };
+            }
+        }
+        assert_eq!(driver.frame(0.5, &[]).len(), usize::from(published), "{left}");
+    }
+}
+
+#[test]
 fn two_of_three_frames_make_a_track_active() {
     let mut driver = Driver::new(&Config::default());
     let first = driver.frame(0.0, &[person(0.0, 8.0)]);

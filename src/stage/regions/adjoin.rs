@@ -28,8 +28,8 @@ impl Adjoin {
     /// Every candidate that shares three tenths of its outline with one of three
     /// times its area becomes a part of the one with which it shares most.
     /// Candidates of no area stay out of it; those that became a part have none
-    /// any more.
-    pub fn run(&mut self, candidates: &mut Candidates) {
+    /// any more. Returns how many did.
+    pub fn run(&mut self, candidates: &mut Candidates) -> u32 {
         self.trace(candidates);
         let boxes = &candidates.boxes;
         self.best.clear();
@@ -47,16 +47,12 @@ impl Adjoin {
         }
         self.ids.clear();
         self.ids.extend(1..=boxes.len() as u32);
-        let mut joins = false;
         for (i, &(large, shared)) in self.best.iter().enumerate() {
             if shared as f32 >= LEAST_SHARED * self.outline[i] as f32 && shared > 0 {
                 self.ids[i] = large;
-                joins = true;
             }
         }
-        if joins {
-            self.write(candidates);
-        }
+        self.write(candidates)
     }
 
     /// Walks along all outlines.
@@ -80,10 +76,7 @@ impl Adjoin {
         };
         // All outlines lie in the box of all boxes, with a border of one.
         let mut all = PixelBox::NONE;
-        for b in boxes.iter().filter(|b| b.area > 0) {
-            (all.x0, all.x1) = (all.x0.min(b.x0), all.x1.max(b.x1));
-            (all.y0, all.y1) = (all.y0.min(b.y0), all.y1.max(b.y1));
-        }
+        boxes.iter().filter(|b| b.area > 0).for_each(|b| all.join(b));
         let columns = all.x0.saturating_sub(1)..(all.x1 + 1).min(ids.width());
         let rows = all.y0.saturating_sub(1)..(all.y1 + 1).min(ids.height());
         for y in rows.clone() {
@@ -99,8 +92,9 @@ impl Adjoin {
         }
     }
 
-    /// Writes the ids of the joined ones, and their boxes.
-    fn write(&mut self, candidates: &mut Candidates) {
+    /// Writes the ids of the joined ones, and their boxes; returns how many there are.
+    fn write(&mut self, candidates: &mut Candidates) -> u32 {
+        let mut joined = 0;
         for i in 0..self.ids.len() {
             // Each step leads to a larger one.
             let mut to = self.ids[i];
@@ -116,11 +110,10 @@ impl Adjoin {
                     *id = if *id == i as u32 + 1 { to } else { *id };
                 }
             }
-            let whole = &mut candidates.boxes[to as usize - 1];
-            (whole.x0, whole.x1) = (whole.x0.min(part.x0), whole.x1.max(part.x1));
-            (whole.y0, whole.y1) = (whole.y0.min(part.y0), whole.y1.max(part.y1));
-            whole.area += part.area;
+            candidates.boxes[to as usize - 1].join(&part);
+            joined += 1;
         }
+        joined
     }
 }
 
@@ -150,7 +143,9 @@ mod tests {
         };
         let boxes: Vec<_> = (1..=rectangles.len() as u32).map(|id| measure(&ids, id)).collect();
         let mut candidates = Candidates { ids, boxes };
-        Adjoin::default().run(&mut candidates);
+        let joined = Adjoin::default().run(&mut candidates);
+        let empty = candidates.boxes.iter().filter(|b| b.area == 0).count();
+        assert_eq!(joined as usize, empty);
         for (id, b) in (1..).zip(&candidates.boxes) {
             assert_eq!(*b, measure(&candidates.ids, id), "{id}");
         }

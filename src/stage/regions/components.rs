@@ -81,7 +81,7 @@ impl PixelBox {
 pub struct Candidates {
     /// 0 background, else 1 + index into `boxes`.
     pub ids: Image<u32>,
-    /// Tight box of each candidate, in the raster order of their first pixels.
+    /// Tight box of each candidate; of area 0 where it is none (any more).
     pub boxes: Vec<PixelBox>,
 }
 

@@ -57,13 +57,14 @@ impl Raised {
     /// plane's by 1.6 px, the salient ones without disparity beside them, and the
     /// holes without disparity that they enclose; what lies
     /// against a larger one belongs to it ([`Adjoin`]), and necks part ([`Part`]).
+    /// Returns how many became a part of another one.
     pub fn run(
         &mut self,
         plane: &Plane,
         source: &RegionSource<'_>,
         components: &mut Components,
         out: &mut Candidates,
-    ) {
+    ) -> u32 {
         let size = source.disparity.size();
         self.relief.resize(size);
         for y in 0..size.height {
@@ -96,11 +97,12 @@ impl Raised {
                 out.boxes[index].area += self.fill(id, &bounds, source.disparity, &mut out.ids);
             }
         }
-        self.adjoin.run(out);
+        let joined = self.adjoin.run(out);
         for id in 1..=out.boxes.len() as u32 {
             self.part.run(id, out);
         }
         self.drop_unmeasured(source, out);
+        joined
     }
 
     /// Of what little was measured nothing is known, however large it is.

@@ -36,10 +36,11 @@ const RIDGE: f64 = 1e-4;
 /// Inverse distances are counted in these per metre, to be of the order of the others.
 const PER_METRE: f32 = 10.0;
 
-/// Share of the blocks that the movers of a view exceed.
+/// Share of the blocks that the movers of a view exceed: a car across the street
+/// covers a twentieth of it.
 const MOVERS: f32 = 0.05;
-/// What is left after a frame of what they moved more than now: they stop for
-/// a frame, and what rests would flare up.
+/// What is left after each frame of what they moved more than now: they stop for
+/// a frame, and what rests would flare up. Of clips with masks .7 to .9 do alike.
 const HELD: f32 = 0.8;
 
 type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
@@ -68,7 +69,7 @@ pub struct EgoMotion {
     blocks: Image<f32>,
     /// `C_M` per cell, 0..=1.
     pub motion: Image<f32>,
-    /// `C_M` that a twentieth of the blocks exceeds; it falls slowly.
+    /// `C_M` that a twentieth of the blocks exceeds; it falls by a fifth per frame at most.
     pub most: f32,
 }
 
@@ -84,6 +85,11 @@ impl EgoMotion {
             motion: Image::default(),
             most: 0.0,
         }
+    }
+
+    /// Forgets what moved before: another recording begins.
+    pub fn reset(&mut self) {
+        self.most = 0.0;
     }
 
     /// Fills [`EgoMotion::motion`] with
@@ -121,7 +127,8 @@ impl EgoMotion {
         let blocks = self.blocks.pixels_mut().iter_mut().enumerate();
         for ((i, out), (block, r)) in blocks.zip(flow.blocks.pixels().iter().zip(residuals)) {
             let [u, v] = self.equations[i / LANES].expected(&found, i % LANES);
-            let [x, y] = [i % width, i / width].map(|at| (at * CELL + CELL / 2) as f64);
+            let x = middle(i % width, cells.width) as f64;
+            let y = middle(i / width, cells.height) as f64;
             // What was out of view has no past that could have moved.
             let was_seen = (0.0..cells.width as f64).contains(&(x + u))
                 && (0.0..cells.height as f64).contains(&(y + v));
@@ -153,9 +160,7 @@ impl EgoMotion {
         let places =
             (0..flow.blocks.height()).flat_map(|y| (0..flow.blocks.width()).map(move |x| (x, y)));
         for (i, ((x, y), block)) in places.zip(flow.blocks.pixels()).enumerate() {
-            // Its middle, to a cell.
-            let u = (x * CELL + CELL / 2).min(filled.width() - 1);
-            let v = (y * CELL + CELL / 2).min(filled.height() - 1);
+            let (u, v) = (middle(x, filled.width()), middle(y, filled.height()));
             let (a, b) = ((u as f32 * cell - cx) / fx, (v as f32 * cell - cy) / fy);
             let (f, g) = (fx / cell, fy / cell);
             let rows = if has_depth {
@@ -225,6 +230,11 @@ fn sum(values: &[f32]) -> f32 {
         }
     }
     sums.iter().chain(rest).sum()
+}
+
+/// The cell in the middle of a block, of `cells`.
+fn middle(block: usize, cells: usize) -> usize {
+    (block * CELL + CELL / 2).min(cells - 1)
 }
 
 impl Equations {

@@ -84,6 +84,7 @@ impl SceneSaliency {
         if first {
             self.ground.reset();
             self.table.reset();
+            self.ego.reset();
         }
         self.ground.run(&scene.coarse.checked, scene.rig);
         let steep = if self.table.plane().is_some() { STEEP_STILL } else { STEEP };
