@@ -223,7 +223,11 @@ pub const FIELDS: &[Field] = &[
         "Depth image in metres (32FC1) or millimetres (16UC1).",
     ),
     live("min_confidence", Real(0.0, 1.0), "Disparities of lower confidence are invalid."),
-    live("regions.min_area", Integer(1, 10_000_000), "Smallest region in pixels. On a ground or table regions of a confidence below 0.2 are refused as well: small ones with few disparities."),
+    live(
+        "regions.min_area",
+        Integer(1, 10_000_000),
+        "Smallest region in pixels. On a ground or table regions of a confidence below 0.2 are refused as well: small ones with few disparities.",
+    ),
     live(
         "regions.max_count",
         Integer(1, 1000),

@@ -217,6 +217,14 @@ fn the_side_of_a_car_that_recedes_is_a_part_of_it() {
 }
 
 #[test]
+fn on_the_axis_a_car_is_not_one_with_what_is_far_behind_it() {
+    // There what recedes could be at any depth in the next column.
+    let cars = [[-1.5, 0.075, 0.0, 1.5, 20.0], [0.0375, 1.6, 0.0, 1.5, 10.0]];
+    let list = things(&upright(&cars)).list;
+    assert_eq!(list.len(), 2, "{list:?}");
+}
+
+#[test]
 fn what_stands_is_found_and_what_floats_is_counted() {
     // A car, a pole, and a sign board that nothing carries, far apart.
     let boxes =

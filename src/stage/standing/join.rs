@@ -19,6 +19,9 @@ const ENOUGH: usize = 2;
 const STEP_M: f32 = 0.5;
 const STEP_PART: f32 = 0.04;
 const STEP_PX: f32 = 0.2;
+/// How far one surface recedes from a column to the next at most, metres: half of a
+/// car's side seen from before it. Near the axis the formula knows no limit.
+const LONGEST_M: f32 = 2.0;
 /// Height of a segment that alone is evidence of a thing, metres.
 const STRONG_M: f32 = 0.4;
 /// Share of a part's columns that must stand on another part of the same thing.
@@ -238,7 +241,8 @@ impl View {
         // columns approach the centre; nothing that is visible recedes faster.
         let (us, ut) = (self.offset(s), self.offset(t));
         let recedes = us * ut > 0.0 && (us.abs() < ut.abs()) == (zs > zt);
-        recedes && step <= most + near * ((us / ut).max(ut / us) - 1.0)
+        recedes
+            && step <= most + (near * ((us / ut).max(ut / us) - 1.0)).min(LONGEST_M * self.scale)
     }
 
     /// Columns from the principal point, pixels.
