@@ -32,21 +32,19 @@ fn frame(shift: impl Fn(f64, f64) -> (f64, f64)) -> Image<u8> {
     })
 }
 
-/// Motion per cell, and that of the movers; `None` where the flow tells nothing.
-fn motion(
+/// One frame after another; false where the flow tells nothing.
+fn run(
+    ego: &mut EgoMotion,
     before: &Image<u8>,
     now: &Image<u8>,
     disparity: Option<&Image<f32>>,
-) -> Option<(Image<f32>, f32)> {
-    let full = Size::new(4 * CELLS.width, 4 * CELLS.height);
+) -> bool {
+    let size = now.size();
+    let full = Size::new(4 * size.width, 4 * size.height);
     let (cx, cy) = (full.width as f64 / 2.0, full.height as f64 / 2.0);
-    let rig = StereoRig::new(
-        Camera::pinhole(full, F, cx, cy, 0.0),
-        Camera::pinhole(full, F, cx, cy, -0.5 * F),
-        0.0,
-    )
-    .unwrap();
-    let filled = disparity.cloned().unwrap_or_else(|| Image::new(CELLS));
+    let camera = |shift| Camera::pinhole(full, F, cx, cy, shift);
+    let rig = StereoRig::new(camera(0.0), camera(-0.5 * F), 0.0).unwrap();
+    let filled = disparity.cloned().unwrap_or_else(|| Image::new(size));
     let coarse = CoarseDisparity { checked: filled.clone(), filled };
     let cells = View { gray: now.clone(), ..View::default() };
     let mut flow = Flow::new(simd::detect());
@@ -61,11 +59,20 @@ fn motion(
         previous: None,
         flow: Some(&flow),
     };
+    ego.run(&flow, &scene, disparity.is_some())
+}
+
+/// Motion per cell, and that of the movers; `None` where the flow tells nothing.
+fn motion(
+    before: &Image<u8>,
+    now: &Image<u8>,
+    disparity: Option<&Image<f32>>,
+) -> Option<(Image<f32>, f32)> {
     let mut found: Vec<_> = simd::available()
         .into_iter()
         .map(|level| {
             let mut ego = EgoMotion::new(level);
-            let known = ego.run(&flow, &scene, disparity.is_some());
+            let known = run(&mut ego, before, now, disparity);
             known.then(|| (ego.motion.clone(), ego.most))
         })
         .collect();
@@ -85,27 +92,8 @@ fn what_moves_at_the_edge_is_seen_where_blocks_are_cut() {
         })
     };
     let seen = |now: &Image<u8>| {
-        let before = frame(0.0, 0.0);
-        let full = Size::new(4 * cells.width, 4 * cells.height);
-        let camera = |shift| Camera::pinhole(full, F, 316.0, 180.0, shift);
-        let rig = StereoRig::new(camera(0.0), camera(-0.5 * F), 0.0).unwrap();
-        let coarse = CoarseDisparity { checked: Image::new(cells), filled: Image::new(cells) };
-        let view = View { gray: now.clone(), ..View::default() };
-        let mut flow = Flow::new(simd::detect());
-        flow.run(&before, now);
-        flow.sharpen();
-        let scene = AttentionScene {
-            stamp: Stamp::default(),
-            left: &view,
-            cells: &view,
-            coarse: &coarse,
-            rig: &rig,
-            previous: None,
-            flow: Some(&flow),
-        };
-        let mut ego = EgoMotion::new(simd::detect());
-        assert!(ego.run(&flow, &scene, false));
-        [ego.motion.get(156, 74), ego.motion.get(142, 88)]
+        let (motion, _) = motion(&frame(0.0, 0.0), now, None).unwrap();
+        [motion.get(156, 74), motion.get(142, 88)]
     };
     // The camera rests, and the thing in the corner does not.
     let [right, below] = seen(&frame(-3.0, 0.0));
@@ -120,27 +108,8 @@ fn what_movers_moved_is_remembered_a_while() {
     let thing = |x: f64, y: f64| (60.0..92.0).contains(&x) && (36.0..64.0).contains(&y);
     let before = frame(|_, _| (0.0, 0.0));
     let moved = frame(|x, y| if thing(x, y) { (3.0, 1.0) } else { (0.0, 0.0) });
-    let full = Size::new(4 * CELLS.width, 4 * CELLS.height);
-    let camera = |shift| Camera::pinhole(full, F, 320.0, 192.0, shift);
-    let rig = StereoRig::new(camera(0.0), camera(-0.5 * F), 0.0).unwrap();
-    let coarse = CoarseDisparity { checked: Image::new(CELLS), filled: Image::new(CELLS) };
     let mut ego = EgoMotion::new(simd::detect());
-    let mut most = |now: &Image<u8>| {
-        let cells = View { gray: now.clone(), ..View::default() };
-        let mut flow = Flow::new(simd::detect());
-        flow.run(&before, now);
-        flow.sharpen();
-        let scene = AttentionScene {
-            stamp: Stamp::default(),
-            left: &cells,
-            cells: &cells,
-            coarse: &coarse,
-            rig: &rig,
-            previous: None,
-            flow: Some(&flow),
-        };
-        ego.run(&flow, &scene, false).then_some(ego.most)
-    };
+    let mut most = |now: &Image<u8>| run(&mut ego, &before, now, None).then_some(ego.most);
     let moving = most(&moved).unwrap();
     assert!(moving > 0.5, "{moving}");
     let [first, second] = [most(&before).unwrap(), most(&before).unwrap()];

@@ -1,10 +1,5 @@
 //! 3x3 noise filters. Beyond the image's edge its outermost pixels continue.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use rayon::prelude::*;
 
 use crate::simd::{Level, dispatch};

@@ -1,10 +1,5 @@
 //! Gradient magnitude.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use rayon::prelude::*;
 
 use crate::image::Image;

@@ -1,10 +1,5 @@
 //! Area resize by a whole factor.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use rayon::prelude::*;
 
 use crate::simd::{Level, dispatch};

@@ -7,11 +7,6 @@
 //! Ma et al., "Constant Time Weighted Median Filtering for Stereo Matching and
 //! Beyond", ICCV 2013, which asks the colours of every pixel).
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use super::components::{Candidates, PixelBox};
 use super::runs::run;
 use crate::image::Image;

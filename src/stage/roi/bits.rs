@@ -1,10 +1,5 @@
 //! A mask of one bit per pixel: 64 pixels are dilated by one instruction.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};

@@ -5,11 +5,6 @@
 //! Object Detection at 80 FPS", ICCV 2015): the barrier of a path is the
 //! difference of the largest and the smallest value on it.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::{Image, Size};
 use crate::simd::{Level, Simd, dispatch, prelude::*, u8x64, u32x16};
 

@@ -1,10 +1,5 @@
 //! Agreement with what is beside at the same depth.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::Image;
 use crate::simd::{Level, dispatch};
 

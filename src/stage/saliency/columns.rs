@@ -1,10 +1,5 @@
 //! What stands is one surface from its foot to its top.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::Image;
 use crate::simd::{Level, dispatch};
 use crate::stage::ground::{Plane, cell_centre};

@@ -1,10 +1,5 @@
 //! What moves by itself: the flow that the camera's own motion does not explain.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use nalgebra::{SMatrix, SVector};
 
 use crate::image::Image;

@@ -1,10 +1,5 @@
 //! Where the cells of this frame were in the previous one.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::{Image, Size};
 use crate::simd::{Level, dispatch};
 use crate::stage::preprocess::resize::box_mean;

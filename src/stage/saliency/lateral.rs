@@ -1,10 +1,5 @@
 //! How far a thing stands out in depth from what is beside it.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::Image;
 use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CELL;

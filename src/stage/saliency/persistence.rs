@@ -1,10 +1,5 @@
 //! What was attended to a moment ago is attended to now.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};

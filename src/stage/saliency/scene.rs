@@ -4,11 +4,6 @@
 //! does; in pictures of things the minimum barrier distance does, and where a
 //! table is seen from above the relief. The plane decides which is asked.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 mod on_plane;
 mod on_table;
 mod without_plane;

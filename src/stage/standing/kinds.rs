@@ -1,10 +1,5 @@
 //! What each cell is evidence of.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use super::centre;
 use crate::image::Image;
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};

@@ -1,10 +1,5 @@
 //! From cells to pixels: the things' own outlines.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u8x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;

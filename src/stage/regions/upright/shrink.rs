@@ -1,10 +1,5 @@
 //! From pixels to cells: the median disparity of each.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::Image;
 use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u8x32};
 use crate::stage::coarse::CELL;

@@ -1,10 +1,5 @@
 //! Where there is a ground: what stands on it, stands out, or is near.
 
-#![allow(
-    clippy::inline_always,
-    reason = "a kernel gets the wide instructions only where `dispatch` inlines it"
-)]
-
 use crate::image::Image;
 use crate::simd::{Level, dispatch};
 use crate::stage::ground::{Plane, cell_centre};
