@@ -205,9 +205,34 @@ fn ground_and_table_do_not_take_turns() {
     assert_eq!(settled(80.0), Some(GroundState::Table));
 }
 
+/// Regions on `plane` where all is salient, and how many candidates were refused.
+fn regions_on(plane: &Plane, disparity: &Image<f32>) -> (RegionList, Rejections) {
+    let rig = rig();
+    let salient = Image::filled(SIZE, 255);
+    let config = Config::default();
+    let mut depth = Image::default();
+    Depth::new(&config).run(disparity, &rig, &mut depth);
+    let source = RegionSource {
+        rgb: &Image::new(SIZE),
+        saliency: &Image::filled(SIZE, 0.8),
+        roi: &RoiMask { salient: salient.clone(), matched: salient, fraction: 1.0 },
+        disparity,
+        coarse: &CoarseDisparity::default(),
+        confidence: &Image::filled(SIZE, 0.9),
+        depth: &depth,
+        rig: &rig,
+        plane: None,
+        table: Some(plane),
+    };
+    let mut out = (RegionList::default(), Rejections::default());
+    let mut labels = Image::default();
+    Regions::new(&config, SIZE, simd::detect()).run(&source, &mut labels, &mut out.0, &mut out.1);
+    out
+}
+
 #[test]
 fn regions_are_what_stands_off_the_plane_with_its_holes() {
-    let (rig, plane) = (rig(), plane(80.0, 0.0));
+    let plane = plane(80.0, 0.0);
     let inside = |x: usize, y: usize, left: usize, top: usize, side: usize| {
         (left..left + side).contains(&x) && (top..top + side).contains(&y)
     };
@@ -225,30 +250,7 @@ fn regions_are_what_stands_off_the_plane_with_its_holes() {
             _ => at,
         }
     });
-    let salient = Image::filled(SIZE, 255);
-    let config = Config::default();
-    let mut depth = Image::default();
-    Depth::new(&config).run(&disparity, &rig, &mut depth);
-    let source = RegionSource {
-        rgb: &Image::new(SIZE),
-        saliency: &Image::filled(SIZE, 0.8),
-        roi: &RoiMask { salient: salient.clone(), matched: salient, fraction: 1.0 },
-        disparity: &disparity,
-        coarse: &CoarseDisparity::default(),
-        confidence: &Image::filled(SIZE, 0.9),
-        depth: &depth,
-        rig: &rig,
-        plane: None,
-        table: Some(&plane),
-    };
-    let (mut labels, mut regions, mut refused) =
-        (Image::default(), RegionList::default(), Rejections::default());
-    Regions::new(&config, SIZE, simd::detect()).run(
-        &source,
-        &mut labels,
-        &mut regions,
-        &mut refused,
-    );
+    let (regions, refused) = regions_on(&plane, &disparity);
     let mut found: Vec<_> = regions.iter().map(|r| (r.x, r.y, r.width, r.height)).collect();
     found.sort_unstable();
     // What was not measured beside the box is taken 20 px far.
@@ -256,4 +258,32 @@ fn regions_are_what_stands_off_the_plane_with_its_holes() {
     let cup = regions.iter().find(|r| r.x == 100).unwrap();
     assert_eq!(cup.area, 3600);
     assert_eq!(refused.small_area, 1);
+}
+
+#[test]
+fn a_rim_belongs_to_its_cup_and_a_cable_parts_what_it_connects() {
+    let plane = plane(80.0, 0.0);
+    let disparity = Image::from_fn(SIZE, |x, y| {
+        let at = plane.disparity(x as f32, y as f32);
+        match (x, y) {
+            // The neck of a bottle is much nearer than the rest of it.
+            (100..160, 100..115) => at + 60.0,
+            // The bottle, and two boxes of one height on a cable.
+            (100..160, 115..160) | (300..340 | 400..440, 100..140) | (340..400, 117..123) => {
+                at + 25.0
+            }
+            _ => at,
+        }
+    });
+    let (regions, refused) = regions_on(&plane, &disparity);
+    let mut found: Vec<_> = regions.iter().map(|r| (r.x, r.y, r.height, r.area)).collect();
+    found.sort_unstable();
+    assert_eq!(found.len(), 3, "{found:?}");
+    assert_eq!(found[0], (100, 100, 60, 3600));
+    let [left, right] = [found[1], found[2]];
+    assert!(left.0 == 300 && (341..=400).contains(&right.0), "{found:?}");
+    assert_eq!((left.2, right.2), (40, 40), "{found:?}");
+    assert_eq!(left.3 + right.3, 2 * 1600 + 360);
+    assert!(left.3 >= 1600 && right.3 >= 1600, "{found:?}");
+    assert_eq!(refused, Rejections::default());
 }

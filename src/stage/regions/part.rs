@@ -125,7 +125,7 @@ impl Part {
         for i in 0..self.order.len() {
             let at = self.order[i] as usize;
             let level = self.distance[at];
-            let mut own = NONE;
+            let (mut own, mut steepest) = (NONE, 0);
             for beside in [
                 at - 1,
                 at + 1,
@@ -139,21 +139,24 @@ impl Part {
                 if self.basin[beside] == NONE {
                     continue;
                 }
-                let other = find(&mut self.basins, self.basin[beside]);
-                if own == NONE || own == other {
-                    own = other;
-                    continue;
+                let mut other = find(&mut self.basins, self.basin[beside]);
+                if own != NONE && own != other {
+                    let (high, low) = self.by_height(own, other);
+                    let lower = self.basins[low as usize];
+                    if f32::from(level) >= NECK * f32::from(lower.peak)
+                        || lower.peak < least_peak
+                        || (lower.area as f32) < least_area
+                    {
+                        self.basins[low as usize].of = high;
+                        self.basins[high as usize].area += lower.area;
+                        (own, other) = (high, high);
+                    }
                 }
-                let (high, low) = self.by_height(own, other);
-                let lower = self.basins[low as usize];
-                if f32::from(level) >= NECK * f32::from(lower.peak)
-                    || lower.peak < least_peak
-                    || (lower.area as f32) < least_area
-                {
-                    self.basins[low as usize].of = high;
-                    self.basins[high as usize].area += lower.area;
+                // Between two basins a pixel flows up the steeper way: given to
+                // the higher one, that would creep around the other along its edge.
+                if own == NONE || self.distance[beside] > steepest {
+                    (own, steepest) = (other, self.distance[beside]);
                 }
-                own = high;
             }
             if own == NONE {
                 own = self.basins.len() as u32;
