@@ -80,9 +80,9 @@ impl ZenohNode {
         topic: &str,
         qos: &QosPolicies,
     ) -> Result<ZenohPublisher<M>, Refused> {
-        let declared = self.declare(Kind::Publisher, topic, M::TYPE_NAME, Some(qos))?;
-        let publisher = self.session.declare_publisher(declared.key.clone()).wait();
-        Ok(ZenohPublisher::new(publisher.map_err(text)?, declared))
+        let entity = self.entity(Kind::Publisher, topic, M::TYPE_NAME, Some(qos))?;
+        let publisher = self.session.declare_publisher(entity.key.clone()).wait().map_err(text)?;
+        Ok(ZenohPublisher::new(publisher, self.announce(entity)?))
     }
 
     /// Subscribes to the topic with this full name. Of what is not taken in
@@ -95,10 +95,10 @@ impl ZenohNode {
         topic: &str,
         qos: &QosPolicies,
     ) -> Result<ZenohSubscription<M>, Refused> {
-        let declared = self.declare(Kind::Subscription, topic, M::TYPE_NAME, Some(qos))?;
+        let entity = self.entity(Kind::Subscription, topic, M::TYPE_NAME, Some(qos))?;
         let queue = zenoh::handlers::RingChannel::new(key::depth(qos));
-        let subscriber = self.session.declare_subscriber(declared.key.clone()).with(queue).wait();
-        Ok(ZenohSubscription::new(subscriber.map_err(text)?, declared))
+        let subscriber = self.session.declare_subscriber(entity.key.clone()).with(queue).wait();
+        Ok(ZenohSubscription::new(subscriber.map_err(text)?, self.announce(entity)?))
     }
 
     /// Offers the service with this full name.
@@ -109,10 +109,11 @@ impl ZenohNode {
         &self,
         service: &str,
     ) -> Result<ZenohServer<Req, Resp>, Refused> {
-        let declared = self.declare(Kind::Server, service, service_type::<Req>(), None)?;
+        let entity = self.entity(Kind::Server, service, service_type::<Req>(), None)?;
         let queue = zenoh::handlers::RingChannel::new(REQUESTS);
-        let queryable = self.session.declare_queryable(declared.key.clone()).complete(true);
-        Ok(ZenohServer::new(queryable.with(queue).wait().map_err(text)?, declared))
+        let queryable = self.session.declare_queryable(entity.key.clone()).complete(true);
+        let queryable = queryable.with(queue).wait().map_err(text)?;
+        Ok(ZenohServer::new(queryable, self.announce(entity)?))
     }
 
     /// Calls the service with this full name.
@@ -123,26 +124,40 @@ impl ZenohNode {
         &self,
         service: &str,
     ) -> Result<ZenohClient<Req, Resp>, Refused> {
-        Ok(ZenohClient::new(self.declare(Kind::Client, service, service_type::<Req>(), None)?))
+        let entity = self.entity(Kind::Client, service, service_type::<Req>(), None)?;
+        Ok(ZenohClient::new(self.announce(entity)?))
     }
 
-    /// Declares the token of an endpoint.
-    fn declare(
+    /// Names an endpoint.
+    fn entity(
         &self,
         kind: Kind,
         name: &str,
         type_name: &str,
         qos: Option<&QosPolicies>,
-    ) -> Result<Declared, Refused> {
+    ) -> Result<Entity, Refused> {
         let hash = schema::type_hash(type_name)
             .ok_or_else(|| format!("the definition of {type_name} is not known"))?;
-        let entity = self.next_entity.fetch_add(1, Ordering::Relaxed);
-        let token = self.place.entity_token(entity, kind, name, type_name, &hash, qos);
+        let number = self.next_entity.fetch_add(1, Ordering::Relaxed);
+        let token = self.place.entity_token(number, kind, name, type_name, &hash, qos);
+        Ok(Entity { key: key::data_key(self.place.domain_id, name, type_name, &hash), token })
+    }
+
+    /// Declares the token of an endpoint. It comes behind the endpoint's own
+    /// declaration: whoever sees a subscription on the graph may write to it.
+    fn announce(&self, Entity { key, token }: Entity) -> Result<Declared, Refused> {
         let gid = key::gid(&token);
-        let key = key::data_key(self.place.domain_id, name, type_name, &hash);
         let token = self.session.liveliness().declare_token(token).wait().map_err(text)?;
         Ok(Declared { key, gid, _token: Arc::new(token), session: self.session.clone() })
     }
+}
+
+/// What an endpoint is called.
+struct Entity {
+    /// The key of its data.
+    key: String,
+    /// The key of its token.
+    token: String,
 }
 
 /// `pkg/srv/Type` of `pkg/srv/Type_Request`.

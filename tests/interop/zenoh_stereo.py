@@ -17,6 +17,7 @@ import zenoh
 IMAGE = "RIHS01_d31d41a9a4c4bc8eae9be757b0beed306564f7526c88ea6a4588fb9582527d47"
 INFO = "RIHS01_b3dfd68ff46c9d56c80fd3bd4ed22c7a4ddce8c8348f2f59c299e73118e7e275"
 START_NS = 1_000_000_000
+PATIENCE_US = 20_000_000
 
 
 class Cdr:
@@ -79,6 +80,10 @@ class Peer:
         config.insert_json5("connect/endpoints", json.dumps([endpoint]))
         config.insert_json5("listen/endpoints", '["tcp/127.0.0.1:0"]')
         config.insert_json5("scouting/multicast/enabled", "false")
+        # By default a busy machine drops what a link cannot take within 1 ms.
+        drop = "transport/link/tx/queue/congestion_control/drop"
+        for limit in ("wait_before_drop", "max_wait_before_drop_fragments"):
+            config.insert_json5(f"{drop}/{limit}", str(PATIENCE_US))
         self.session = zenoh.open(config)
         self.domain, self.namespace = domain, namespace
         self.prefix = f"@ros2_lv/{domain}/{self.session.zid()}/0"
@@ -125,8 +130,8 @@ def main():
                     (seconds * 10**9 + nanoseconds, sequence, len(payload), good)
                 )
 
-        peer.token(number, "MS", topic, type_name, "RIHS01_0", "::,5:,:,:,,")
         peer.kept.append(peer.session.declare_subscriber(peer.key(topic, type_name, "*"), heard))
+        peer.token(number, "MS", topic, type_name, "RIHS01_0", "::,5:,:,:,,")
 
     listen(1, "regions", "salient_stereo_msgs::msg::dds_::SalientRegionArray_")
     for number, rule in enumerate(arguments.listen, 20):

@@ -17,3 +17,22 @@ pub fn domain(test: u16) -> u16 {
 pub fn port(test: u16) -> u16 {
     20_000 + (std::process::id() % 2000) as u16 * 4 + test
 }
+
+/// The overrides of a Zenoh session that connects or listens at TCP endpoints
+/// on this machine. A busy machine does not drop messages: by default a link
+/// drops what it cannot take within a millisecond, as `rmw_zenoh` does.
+#[cfg(feature = "zenoh")]
+pub fn zenoh_overrides(connect: &[u16], listen: &[u16]) -> String {
+    const DROP: &str = "transport/link/tx/queue/congestion_control/drop";
+    const PATIENCE_US: u32 = 20_000_000;
+    let endpoints = |ports: &[u16]| {
+        let each: Vec<String> = ports.iter().map(|port| format!("tcp/127.0.0.1:{port}")).collect();
+        serde_json::to_string(&each).unwrap()
+    };
+    format!(
+        "connect/endpoints={};listen/endpoints={};\
+         {DROP}/wait_before_drop={PATIENCE_US};{DROP}/max_wait_before_drop_fragments={PATIENCE_US}",
+        endpoints(connect),
+        endpoints(listen)
+    )
+}

@@ -12,7 +12,7 @@ use salient_stereo::ros::runtime::{NodeOptions, NodeRuntime};
 use salient_stereo::ros::schema;
 use serde_json::json;
 
-use super::super::domain::port;
+use super::super::domain::{port, zenoh_overrides};
 use super::{outcome, python, script};
 
 #[test]
@@ -20,7 +20,7 @@ fn a_zenoh_peer_gets_one_region_array_per_pair() {
     const DOMAIN: u16 = 11;
     let Some(script) = script("zenoh_stereo.py") else { return };
     let port = port(2);
-    let overrides = format!(r#"connect/endpoints=[];listen/endpoints=["tcp/127.0.0.1:{port}"]"#);
+    let overrides = zenoh_overrides(&[], &[port]);
     let environment = Environment {
         middleware: Middleware::Zenoh(ZenohSettings { config_file: None, overrides }),
         ..Environment::localhost(DOMAIN)

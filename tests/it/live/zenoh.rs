@@ -16,7 +16,7 @@ use salient_stereo::ros::node::RosNode;
 use salient_stereo::ros::play::{RegionsListener, StereoPlayer};
 use salient_stereo::ros::qos;
 
-use super::super::domain::port;
+use super::super::domain::{port, zenoh_overrides};
 use super::{HEIGHT, PATIENCE, WIDTH, call, names, pair, small, start, wait};
 
 /// Two environments: the first listens, the second connects to it.
@@ -25,10 +25,8 @@ fn linked(port: u16) -> [Environment; 2] {
         let settings = ZenohSettings { config_file: None, overrides };
         Environment { middleware: Middleware::Zenoh(settings), ..Environment::localhost(9) }
     };
-    [
-        environment(format!(r#"connect/endpoints=[];listen/endpoints=["tcp/127.0.0.1:{port}"]"#)),
-        environment(format!(r#"connect/endpoints=["tcp/127.0.0.1:{port}"]"#)),
-    ]
+    // Port 0: any that is free.
+    [environment(zenoh_overrides(&[], &[port])), environment(zenoh_overrides(&[port], &[0]))]
 }
 
 #[test]
