@@ -1,9 +1,9 @@
 //! All stages together: what the whole promises, whichever stage keeps it.
 
 use salient_stereo::config::{Config, SaliencyMode};
-use salient_stereo::image::{Image, Size};
+use salient_stereo::image::{Image, Picture, Size};
 use salient_stereo::input::synthetic::{SceneKind, SceneOptions, SyntheticScene};
-use salient_stereo::perception::Perception;
+use salient_stereo::perception::{Perception, StereoFrame};
 use salient_stereo::pipeline::Pipeline;
 use salient_stereo::simd;
 
@@ -72,4 +72,49 @@ fn full_frame_looks_everywhere_and_the_others_at_what_stands_out() {
         same += usize::from((a - b).abs() <= 1.0);
     }
     assert!(n > 1000 && same as f64 > 0.97 * f64::from(n), "{same} of {n}");
+}
+
+/// What a gray camera sends, in its own form or in three equal channels, is the
+/// same scene: the shorter way for gray pictures changes nothing.
+#[test]
+fn a_gray_picture_and_equal_channels_are_seen_alike() {
+    const FRAMES: usize = 3;
+    let options = SceneOptions { size: SIZE, frames: FRAMES, ..SceneKind::Street.defaults() };
+    let scene = SyntheticScene::new(SceneKind::Street, options).unwrap();
+    let gray = |picture: &Picture| match picture {
+        Picture::Gray(gray) => gray.clone(),
+        Picture::Rgb(rgb) => {
+            Image::from_vec(rgb.size(), rgb.pixels().iter().map(|p| p[1]).collect()).unwrap()
+        }
+    };
+    let equal = |gray: &Image<u8>| {
+        Picture::Rgb(
+            Image::from_vec(gray.size(), gray.pixels().iter().map(|&g| [g; 3]).collect()).unwrap(),
+        )
+    };
+    for illumination in ["none", "clahe"] {
+        let config =
+            Config::default().with("preprocess.illumination", &illumination.into()).unwrap();
+        let rig = scene.observation(0).frame.rig.clone();
+        let mut outs = [(); 2].map(|()| Perception::new(SIZE, rig.clone()));
+        let mut pipelines = [(); 2].map(|()| Pipeline::new(&config, SIZE, simd::detect()));
+        for n in 0..FRAMES {
+            let frame = scene.observation(n).frame;
+            let (left, right) = (gray(&frame.left), gray(&frame.right));
+            let alike = StereoFrame { left: equal(&left), right: equal(&right), ..frame.clone() };
+            let own =
+                StereoFrame { left: Picture::Gray(left), right: Picture::Gray(right), ..frame };
+            for ((pipeline, out), frame) in pipelines.iter_mut().zip(&mut outs).zip([own, alike]) {
+                pipeline.process(&frame, out);
+            }
+        }
+        let [own, alike] = &outs;
+        assert_eq!(own.left.is_gray, illumination == "none");
+        assert!(!alike.left.is_gray);
+        assert!(own.left.rgb.pixels() == alike.left.rgb.pixels());
+        assert!(own.saliency.pixels() == alike.saliency.pixels(), "{illumination}: attention");
+        assert!(own.roi.matched.pixels() == alike.roi.matched.pixels(), "{illumination}: ROI");
+        assert!(own.labels.pixels() == alike.labels.pixels(), "{illumination}: regions");
+        assert!(!own.regions.is_empty());
+    }
 }
