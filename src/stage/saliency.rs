@@ -236,6 +236,6 @@ impl Saliency {
             mode.even_contrast(attention);
         }
         self.persistence.stay(attention, &mut previous.frame.attended);
-        upsample(attention, self.size, saliency);
+        upsample(self.level, attention, self.size, saliency);
     }
 }

@@ -159,7 +159,7 @@ fn attention() -> Image<f32> {
 
 fn run(config: &Config, coarse: &CoarseDisparity, rig: &StereoRig) -> RoiMask {
     let (attention, mut saliency) = (attention(), Image::default());
-    upsample(&attention, SIZE, &mut saliency);
+    upsample(simd::detect(), &attention, SIZE, &mut saliency);
     let mut out = RoiMask::default();
     Roi::new(config, SIZE, simd::detect()).run(&attention, &saliency, coarse, rig, &mut out);
     assert_eq!((out.salient.size(), out.matched.size()), (SIZE, SIZE));
@@ -174,7 +174,7 @@ fn the_region_is_the_composition_of_its_steps() {
         config.saliency.threshold_mode = mode;
         config.roi.dilation = dilation;
         let mut saliency = Image::default();
-        upsample(&attention(), SIZE, &mut saliency);
+        upsample(simd::detect(), &attention(), SIZE, &mut saliency);
         let threshold = match mode {
             ThresholdMode::Fixed => 0.55,
             ThresholdMode::Otsu => otsu(&attention()),

@@ -199,7 +199,7 @@ fn upsampling_interpolates_between_cell_centres() {
     for size in ODD_SIZES {
         let cells = Noise(3).map(size.divided_by(4));
         let mut out = Image::default();
-        upsample(&cells, size, &mut out);
+        upsample(simd::detect(), &cells, size, &mut out);
         assert_near(&out, &plain::upsample(&cells, size), 1e-6, "upsampling");
     }
 }

@@ -76,8 +76,11 @@ impl Columns {
                 for (((&part, &mean), d), (carried, inside)) in
                     cells.zip(carried.iter_mut().zip(inside.iter_mut()))
                 {
-                    *carried = if *inside > 0.0 { *carried } else { mean };
-                    *d = if part > OUTSIDE { *carried } else { *d };
+                    // What may stay is read before it is asked for: no branches.
+                    let (so_far, own) = (*carried, *d);
+                    let surface = if *inside > 0.0 { so_far } else { mean };
+                    *carried = surface;
+                    *d = if part > OUTSIDE { surface } else { own };
                     *inside = if part > BASE { 1.0 } else { 0.0 };
                 }
             }

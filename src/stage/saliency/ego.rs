@@ -135,7 +135,7 @@ impl EgoMotion {
         let rank = ((1.0 - MOVERS) * (self.ranked.len() - 1) as f32) as usize;
         let now = *self.ranked.select_nth_unstable_by(rank, f32::total_cmp).1;
         self.most = now.max(held + (1.0 - HELD) * now);
-        upsample(&self.blocks, scene.cells.gray.size(), &mut self.motion);
+        upsample(self.level, &self.blocks, scene.cells.gray.size(), &mut self.motion);
         true
     }
 

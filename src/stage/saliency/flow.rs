@@ -98,7 +98,7 @@ impl Flow {
             for (value, shift) in self.block.pixels_mut().iter_mut().zip(grid.pixels()) {
                 *value = shift[axis] as f32;
             }
-            upsample(&self.block, size, out);
+            upsample(self.level, &self.block, size, out);
         }
         let (now, before, trust) = (&self.now[0], &self.windows[0], &mut self.block);
         dispatch!(self.level, _simd => {
@@ -110,7 +110,7 @@ impl Flow {
                 }
             }
         });
-        upsample(&self.block, size, &mut self.trust);
+        upsample(self.level, &self.block, size, &mut self.trust);
     }
 
     /// Fills [`Flow::blocks`]: the shifts of the last run to parts of a pixel.
@@ -303,10 +303,12 @@ impl Windows {
         let columns = (view.width() + 1).saturating_sub(BLOCK);
         self.height = view.height();
         self.rows.resize(columns * self.height, [0; BLOCK]);
-        for (y, row) in view.rows().enumerate() {
-            let places = self.rows.get_mut(y..).unwrap_or_default().iter_mut();
-            for (place, window) in places.step_by(self.height).zip(row.windows(BLOCK)) {
-                place.copy_from_slice(window);
+        // Written in order: the view is small enough to be read in any.
+        for (x, column) in self.rows.chunks_exact_mut(self.height.max(1)).enumerate() {
+            for (place, row) in column.iter_mut().zip(view.rows()) {
+                if let Some(window) = row[x..].first_chunk() {
+                    *place = *window;
+                }
             }
         }
     }

@@ -3,14 +3,18 @@
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use crate::stage::coarse::CELL;
+
+/// Cells that are taken at once.
+const LANES: usize = 16;
 
 /// Bilinear interpolation of a map over cells of [`CELL`] pixels at every
 /// pixel of an image of `size`; outside the outermost cell centres the nearest
 /// value. Cell `i` has its centre at pixel `4 i + 1.5`.
 ///
 /// `cells` must have the size `size.divided_by(CELL)`.
-pub fn upsample(cells: &Image<f32>, size: Size, out: &mut Image<f32>) {
+pub fn upsample(level: Level, cells: &Image<f32>, size: Size, out: &mut Image<f32>) {
     out.resize(size);
     if size.is_empty() || cells.size() != size.divided_by(CELL) {
         return;
@@ -19,28 +23,82 @@ pub fn upsample(cells: &Image<f32>, size: Size, out: &mut Image<f32>) {
         |(y, out)| {
             let (upper, lower, share) = neighbours(y, cells.height());
             let (upper, lower) = (cells.row(upper), cells.row(lower));
-            let vertical = |x: usize| upper[x] + share * (lower[x] - upper[x]);
-            let mut left = vertical(0);
-            let mut here = left;
-            // Whole cells first: their length is known and they vectorise.
-            let (whole, cut) = out.as_chunks_mut::<CELL>();
-            let after = |x: usize| vertical((x + 1).min(cells.width() - 1));
-            for (x, pixels) in whole.iter_mut().enumerate() {
-                let right = after(x);
-                *pixels = across(left, here, right);
-                (left, here) = (here, right);
-            }
-            let pixels = across(left, here, after(cells.width() - 1));
-            cut.copy_from_slice(&pixels[..cut.len()]);
+            dispatch!(level, simd => Rows { upper, lower, share }.spread(simd, out));
         },
     );
 }
 
-/// The four pixels of a cell from its value and those of its neighbours.
-fn across(left: f32, here: f32, right: f32) -> [f32; CELL] {
-    let (before, after) = (left - here, right - here);
-    [here + 0.375 * before, here + 0.125 * before, here + 0.125 * after, here + 0.375 * after]
+/// The rows of cells above and below a row of pixels, and the share of the latter.
+struct Rows<'a> {
+    upper: &'a [f32],
+    lower: &'a [f32],
+    share: f32,
 }
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn spread<S: Simd>(&self, simd: S, out: &mut [f32]) {
+        let last = self.upper.len() - 1;
+        // Cells with neighbours on both sides; the last of them once more.
+        if let Some(end) = (last + 1).checked_sub(LANES + 1).filter(|end| *end > 0) {
+            for x in (1..end).step_by(LANES).chain([end]) {
+                self.spread_cells(simd, x, &mut out[x * CELL..(x + LANES) * CELL]);
+            }
+        } else {
+            for x in 1..last {
+                self.spread_cell(x, &mut out[x * CELL..(x + 1) * CELL]);
+            }
+        }
+        for x in [0, last] {
+            let end = out.len().min((x + 1) * CELL);
+            self.spread_cell(x, &mut out[x * CELL..end]);
+        }
+    }
+
+    /// The value between the rows at cell `x`.
+    #[inline(always)]
+    fn at(&self, x: usize) -> f32 {
+        self.upper[x] + self.share * (self.lower[x] - self.upper[x])
+    }
+
+    #[inline(always)]
+    fn spread_cell(&self, x: usize, out: &mut [f32]) {
+        let here = self.at(x);
+        let before = self.at(x.saturating_sub(1)) - here;
+        let after = self.at((x + 1).min(self.upper.len() - 1)) - here;
+        let pixels = [(before, OUTER), (before, INNER), (after, INNER), (after, OUTER)];
+        for (out, (step, share)) in out.iter_mut().zip(pixels) {
+            *out = here + share * step;
+        }
+    }
+
+    #[inline(always)]
+    fn spread_cells<S: Simd>(&self, simd: S, x: usize, out: &mut [f32]) {
+        let here = self.lanes(simd, x);
+        let before = self.lanes(simd, x - 1) - here;
+        let after = self.lanes(simd, x + 1) - here;
+        let (first, third) = (here + before * OUTER, here + after * INNER);
+        let (second, fourth) = (here + before * INNER, here + after * OUTER);
+        let (odd, even) = (first.interleave(third), second.interleave(fourth));
+        let (low, high) = (odd.0.interleave(even.0), odd.1.interleave(even.1));
+        for (out, pixels) in
+            out.as_chunks_mut::<LANES>().0.iter_mut().zip([low.0, low.1, high.0, high.1])
+        {
+            pixels.store_slice(out);
+        }
+    }
+
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, simd: S, x: usize) -> f32x16<S> {
+        let upper = f32x16::from_slice(simd, &self.upper[x..x + LANES]);
+        let lower = f32x16::from_slice(simd, &self.lower[x..x + LANES]);
+        upper + (lower - upper) * self.share
+    }
+}
+
+/// Shares of the neighbour in a cell's outer and inner pixels.
+const OUTER: f32 = 0.375;
+const INNER: f32 = 0.125;
 
 /// The cells on both sides of pixel `at`, and the share of the second.
 fn neighbours(at: usize, cells: usize) -> (usize, usize, f32) {

@@ -1,6 +1,6 @@
 //! What each cell is evidence of.
 
-use super::centre;
+use super::{WIDE, centre};
 use crate::image::Image;
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use crate::stage::ground::Plane;
@@ -16,6 +16,8 @@ const LEAST_DISPARITY: f32 = 1.2;
 
 /// Columns whose cells are looked at side by side.
 const LANES: usize = 16;
+const LANE: [f32; LANES] =
+    [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 /// Rows whose bits are collected before they are written: a part of a word.
 const ROWS: usize = 32;
 
@@ -85,7 +87,8 @@ impl Kinds {
         let lower = (upper + ROWS).min(disparity.height());
         let noise = f32x16::splat(simd, NOISE_PX * plane.camera_height_m);
         let lowest = LOW_M * super::size_scale(plane);
-        let slope = f32x16::from_fn(simd, |i| plane.b * centre(x + i, 0).0);
+        let column = f32x16::from_slice(simd, &LANE) * WIDE as f32 + centre(x, 0).0;
+        let slope = column * plane.b;
         let none = u32x16::splat(simd, 0);
         let [mut known_bits, mut ground_bits, mut evidence_bits] = [none; 3];
         for y in upper..lower {
