@@ -181,7 +181,6 @@ impl Pipeline {
             disparity: &out.disparity,
             coarse: &self.coarse_disparity,
             confidence: &out.confidence,
-            depth: &out.depth,
             rig: &out.rig,
             plane: footing.ground(),
             table: footing.table(),

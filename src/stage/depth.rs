@@ -3,12 +3,14 @@
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::Image;
+use crate::simd::{Simd, f32x16, prelude::*};
 
 /// ε of eq. 2 in pixels. It keeps the division defined and is far below the
 /// finest disparity step (1/32 px): at d = 1 px it moves Z by one millionth.
 pub const EPSILON_PX: f32 = 1e-6;
 
 /// Z = f B / (d + ε), clipped as REP 117 wants it.
+#[derive(Clone, Copy, Debug)]
 pub struct Depth {
     min_m: f32,
     max_m: f32,
@@ -26,21 +28,32 @@ impl Depth {
     /// noise around it): +Inf.
     pub fn run(&mut self, disparity: &Image<f32>, rig: &StereoRig, depth: &mut Image<f32>) {
         let scale = rig.depth_scale() as f32;
-        let (min_m, max_m) = (self.min_m, self.max_m);
+        let limits = *self;
         depth.resize(disparity.size());
         for (z, &d) in depth.pixels_mut().iter_mut().zip(disparity.pixels()) {
-            *z = depth_from_disparity(d, scale, min_m, max_m);
+            *z = limits.of(d, scale);
         }
     }
-}
 
-/// One pixel of eq. 2; `scale_px_m` is f B in pixel metres.
-#[inline]
-pub fn depth_from_disparity(d: f32, scale_px_m: f32, min_m: f32, max_m: f32) -> f32 {
-    // Written as selections, not branches, so that whole rows become vectors.
-    let z = scale_px_m / (d + EPSILON_PX);
-    let z = if z < min_m { f32::NEG_INFINITY } else { z };
-    let z = if z > max_m { f32::INFINITY } else { z };
-    let z = if d <= 0.0 { f32::INFINITY } else { z };
-    if d.is_nan() { f32::NAN } else { z }
+    /// One pixel of eq. 2; `scale_px_m` is f B in pixel metres.
+    #[inline(always)]
+    pub fn of(&self, d: f32, scale_px_m: f32) -> f32 {
+        // Written as selections, not branches, so that whole rows become vectors.
+        let z = scale_px_m / (d + EPSILON_PX);
+        let z = if z < self.min_m { f32::NEG_INFINITY } else { z };
+        let z = if z > self.max_m { f32::INFINITY } else { z };
+        let z = if d <= 0.0 { f32::INFINITY } else { z };
+        if d.is_nan() { f32::NAN } else { z }
+    }
+
+    /// The same of sixteen pixels.
+    #[inline(always)]
+    pub fn of_lanes<S: Simd>(&self, simd: S, d: f32x16<S>, scale_px_m: f32) -> f32x16<S> {
+        let infinite = f32x16::splat(simd, f32::INFINITY);
+        let z = f32x16::splat(simd, scale_px_m) / (d + EPSILON_PX);
+        let z = z.simd_lt(self.min_m).select(-infinite, z);
+        let z = z.simd_gt(self.max_m).select(infinite, z);
+        // NaN stays.
+        d.simd_le(0.0).select(infinite, z)
+    }
 }

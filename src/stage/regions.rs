@@ -12,14 +12,17 @@ pub mod trim;
 pub mod union_find;
 pub mod upright;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
 use crate::perception::{Region, RegionList, Rejections, RoiMask};
-use crate::simd::Level;
+use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CoarseDisparity;
+use crate::stage::depth::Depth;
 use crate::stage::ground::Plane;
 use components::{Candidates, Components};
 use contour::Contour;
@@ -67,8 +70,6 @@ pub struct RegionSource<'a> {
     pub coarse: &'a CoarseDisparity,
     /// Confidence of the disparity.
     pub confidence: &'a Image<f32>,
-    /// Depth in metres, NaN, +Inf, -Inf as in `Perception::depth`.
-    pub depth: &'a Image<f32>,
     /// Calibration of these images.
     pub rig: &'a StereoRig,
     /// The ground, where one is known: what stands on it becomes a region.
@@ -87,6 +88,7 @@ pub struct Regions {
     /// In mode `scene`, where attention tells what matters without a plane.
     weighs: bool,
     contour_tolerance: f32,
+    depth: Depth,
     components: Components,
     upright: Upright,
     raised: Raised,
@@ -116,6 +118,7 @@ impl Regions {
             max_count: usize::try_from(config.regions.max_count).unwrap_or(1),
             weighs: config.saliency.mode == SaliencyMode::Scene,
             contour_tolerance: config.regions.contour_tolerance as f32,
+            depth: Depth::new(config),
             components: Components::default(),
             upright: Upright::new(level),
             raised: Raised::new(level),
@@ -178,8 +181,10 @@ impl Regions {
     /// Fills one region for each of `self.ids`, and what speaks for it.
     fn measure(&mut self, source: &RegionSource<'_>, regions: &mut [Region]) {
         while self.workers.len() < rayon::current_num_threads() {
-            self.workers
-                .push(Worker { measure: Measure::new(self.level), contour: Contour::default() });
+            self.workers.push(Worker {
+                measure: Measure::new(self.level, self.depth),
+                contour: Contour::new(self.level),
+            });
         }
         self.evidence.resize(regions.len(), Evidence::default());
         let Self { candidates, ids, evidence, workers, .. } = self;
@@ -199,15 +204,17 @@ impl Regions {
     /// Numbers the regions in their order, in the label image too, and draws their contours.
     fn label(&mut self, labels: &mut Image<u16>, regions: &mut RegionList) {
         labels.resize(self.size);
-        labels.fill(0);
         for (label, region) in (1..).zip(regions.iter_mut()) {
             region.label = label;
-            let (x, width) = (region.x as usize, region.width as usize);
-            for (dy, mask) in region.mask.chunks_exact(width).enumerate() {
-                let row = &mut labels.row_mut(region.y as usize + dy)[x..x + width];
-                for (label, _) in row.iter_mut().zip(mask).filter(|(_, m)| **m != 0) {
-                    *label = region.label;
-                }
+        }
+        // Rows that were just cleared are still at hand.
+        for upper in (0..self.size.height).step_by(BAND) {
+            let band = upper..(upper + BAND).min(self.size.height);
+            for y in band.clone() {
+                labels.row_mut(y).fill(0);
+            }
+            for region in regions.iter() {
+                dispatch!(self.level, _simd => mark(region, band.clone(), labels));
             }
         }
         let Self { workers, contour_tolerance, .. } = self;
@@ -219,6 +226,42 @@ impl Regions {
                 worker.contour.run(mask, width, origin, tolerance, &mut region.contour);
             }
         });
+    }
+}
+
+/// Rows that are labelled together.
+const BAND: usize = 8;
+
+/// Writes the label of a region into rows `band`, sixteen pixels at a time and
+/// the last sixteen of a row once more: rows are short.
+#[inline(always)]
+fn mark(region: &Region, band: Range<usize>, labels: &mut Image<u16>) {
+    const LANES: usize = 16;
+    let (x, y) = (region.x as usize, region.y as usize);
+    let (width, height) = (region.width as usize, region.height as usize);
+    for y_of in band.start.max(y)..band.end.min(y + height) {
+        let mask = &region.mask[(y_of - y) * width..][..width];
+        let row = &mut labels.row_mut(y_of)[x..x + width];
+        let whole = mask.as_chunks::<LANES>().0.iter().zip(row.as_chunks_mut::<LANES>().0);
+        for (mask, row) in whole {
+            mark_lanes(region.label, mask, row);
+        }
+        if let (Some(mask), Some(row)) = (mask.last_chunk(), row.last_chunk_mut()) {
+            mark_lanes::<LANES>(region.label, mask, row);
+        } else {
+            for (mask, pixel) in mask.iter().zip(row) {
+                mark_lanes(region.label, &[*mask], std::array::from_mut(pixel));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn mark_lanes<const N: usize>(label: u16, mask: &[u8; N], row: &mut [u16; N]) {
+    // Read before it is asked for: else there would be a branch for each.
+    let old = *row;
+    for i in 0..N {
+        row[i] = if mask[i] != 0 { label } else { old[i] };
     }
 }
 

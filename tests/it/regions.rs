@@ -10,7 +10,6 @@ use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::{RegionList, Rejections, RoiMask};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
-use salient_stereo::stage::depth::Depth;
 use salient_stereo::stage::regions::components::{Candidates, Components, agree};
 use salient_stereo::stage::regions::contour::Contour;
 use salient_stereo::stage::regions::{RegionSource, Regions, priority};
@@ -187,7 +186,7 @@ proptest! {
         let bit = |i: usize| bits.get(i).copied().unwrap_or(false);
         let parts = flood(size, bit, |_, _| true);
         let mask: Vec<u8> = parts.iter().map(|&p| u8::from(p == 1) * 255).collect();
-        let mut contour = Contour::default();
+        let mut contour = Contour::new(simd::detect());
         let boundary = contour.follow(&mask, width).to_vec();
         if !mask.contains(&255) {
             prop_assert!(boundary.is_empty());
@@ -235,14 +234,14 @@ fn of_a_mask_in_parts_the_largest_is_outlined() {
     ];
     let mask: Vec<u8> = rows.concat().bytes().map(|c| u8::from(c == b'#') * 255).collect();
     let mut polygon = Vec::new();
-    Contour::default().run(&mask, 9, [0, 0], 0.5, &mut polygon);
+    Contour::new(simd::detect()).run(&mask, 9, [0, 0], 0.5, &mut polygon);
     assert_eq!(polygon, [[3.0, 1.0], [7.0, 1.0], [7.0, 5.0], [3.0, 5.0]]);
 }
 
 #[test]
 fn a_mask_as_thin_as_a_line_still_has_three_corners() {
     let mut polygon = Vec::new();
-    Contour::default().run(&[255; 12], 12, [0, 0], 1.0, &mut polygon);
+    Contour::new(simd::detect()).run(&[255; 12], 12, [0, 0], 1.0, &mut polygon);
     assert_eq!(polygon.len(), 3);
 }
 
@@ -306,8 +305,6 @@ impl Boxes {
 
     fn run(&self, config: &Config) -> (Image<u16>, RegionList, Rejections) {
         let rig = rig(self.size);
-        let mut depth = Image::default();
-        Depth::new(config).run(&self.disparity, &rig, &mut depth);
         let roi =
             RoiMask { salient: self.salient.clone(), matched: self.salient.clone(), fraction: 0.5 };
         let source = RegionSource {
@@ -317,7 +314,6 @@ impl Boxes {
             disparity: &self.disparity,
             coarse: &CoarseDisparity::default(),
             confidence: &self.confidence,
-            depth: &depth,
             rig: &rig,
             plane: None,
             table: None,

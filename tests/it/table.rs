@@ -7,7 +7,6 @@ use salient_stereo::image::{Image, Size};
 use salient_stereo::perception::{RegionList, Rejections, RoiMask, View};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
-use salient_stereo::stage::depth::Depth;
 use salient_stereo::stage::ground::{GroundState, Plane, cell_centre};
 use salient_stereo::stage::regions::{RegionSource, Regions};
 use salient_stereo::stage::saliency::{Previous, Saliency, Scene};
@@ -210,8 +209,6 @@ fn regions_on(plane: &Plane, disparity: &Image<f32>) -> (RegionList, Rejections)
     let rig = rig();
     let salient = Image::filled(SIZE, 255);
     let config = Config::default();
-    let mut depth = Image::default();
-    Depth::new(&config).run(disparity, &rig, &mut depth);
     let source = RegionSource {
         rgb: &Image::new(SIZE),
         saliency: &Image::filled(SIZE, 0.8),
@@ -219,7 +216,6 @@ fn regions_on(plane: &Plane, disparity: &Image<f32>) -> (RegionList, Rejections)
         disparity,
         coarse: &CoarseDisparity::default(),
         confidence: &Image::filled(SIZE, 0.9),
-        depth: &depth,
         rig: &rig,
         plane: None,
         table: Some(plane),

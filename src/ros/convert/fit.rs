@@ -10,6 +10,7 @@ use crate::ros::cdr;
 use crate::ros::message::geometry_msgs::Point32;
 use crate::ros::message::salient_stereo_msgs::SalientRegionArray;
 use crate::ros::message::sensor_msgs::CompressedImage;
+use crate::simd;
 use crate::stage::regions::simplify::Simplify;
 
 /// Bytes up to which an encoded region array arrives with stock buffers.
@@ -83,7 +84,7 @@ pub fn fit_regions(array: &mut SalientRegionArray) -> Option<Reduction> {
         reduction.bytes_after = len(array);
     }
     // Twice as coarse each time; 64 pixels make a triangle of anything.
-    let (mut tolerance, mut simplify) = (2.0, Simplify::default());
+    let (mut tolerance, mut simplify) = (2.0, Simplify::new(simd::detect()));
     while reduction.bytes_after > REGIONS_LIMIT && tolerance <= 64.0 {
         for region in &mut array.regions {
             let before = region.contour.points.len();
@@ -185,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_contour_is_at_least_a_triangle() {
-        let simplify = &mut Simplify::default();
+        let simplify = &mut Simplify::new(simd::detect());
         let line: Vec<_> = (0..9).map(|i| Point32 { x: i as f32, y: 0.0, z: 0.0 }).collect();
         assert_eq!(simplified(&line, 1.0, simplify).len(), 3);
         assert_eq!(simplified(&line[..2], 1.0, simplify).len(), 2);

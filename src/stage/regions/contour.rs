@@ -1,14 +1,15 @@
 //! The outer boundary of a mask as a polygon.
 
 use super::simplify::Simplify;
+use crate::simd::Level;
 
 /// Steps to the 8 neighbours, clockwise in image coordinates (y points down), from east.
 const STEPS: [(isize, isize); 8] =
     [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
-const WEST: usize = 4;
+const WEST: u32 = 4;
 
 /// The boundary follower with its buffers.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Contour {
     boundary: Vec<[i32; 2]>,
     part: Vec<[i32; 2]>,
@@ -17,6 +18,16 @@ pub struct Contour {
 }
 
 impl Contour {
+    /// The follower with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self {
+            boundary: Vec::new(),
+            part: Vec::new(),
+            met: Vec::new(),
+            simplify: Simplify::new(level),
+        }
+    }
+
     /// The outer boundary of the largest part of `mask` (rows of `width` pixels,
     /// inside where not 0) through the centres of its boundary pixels, clockwise
     /// on the screen, in coordinates of the mask: border following (Moore;
@@ -35,9 +46,8 @@ impl Contour {
                 if self.met[start] || !is_upper_end(mask, width, start) {
                     continue;
                 }
-                self.follow_from(mask, width, start);
                 // The boundary of a hole runs the other way round and counts negative.
-                let enclosed = doubled_area(&self.part);
+                let enclosed = self.follow_from(mask, width, start);
                 if enclosed > most {
                     most = enclosed;
                     std::mem::swap(&mut self.boundary, &mut self.part);
@@ -48,26 +58,24 @@ impl Contour {
     }
 
     /// The boundary on which the pixel `start` lies whose northern and western
-    /// neighbours are outside, into `part`.
-    fn follow_from(&mut self, mask: &[u8], width: usize, start: usize) {
+    /// neighbours are outside, into `part`. Returns twice the enclosed area
+    /// (shoelace formula), positive for a boundary that runs clockwise on the screen.
+    fn follow_from(&mut self, mask: &[u8], width: usize, start: usize) -> i64 {
         self.part.clear();
-        let height = mask.len() / width;
-        let inside = |x: usize, y: usize| x < width && y < height && mask[y * width + x] != 0;
         let start = (start % width, start / width);
         let (mut x, mut y) = start;
         // The western neighbour is outside; the search goes clockwise from there.
         let mut from = WEST;
         let mut first_step = None;
+        let mut enclosed = 0;
         loop {
             self.met[y * width + x] = true;
-            let found = (0..8).map(|k| (from + k) % 8).find(|&step| {
-                let (dx, dy) = STEPS[step];
-                inside(x.wrapping_add_signed(dx), y.wrapping_add_signed(dy))
-            });
-            let Some(step) = found else {
+            let around = neighbours(mask, width, x, y);
+            if around == 0 {
                 self.part.push([x as i32, y as i32]);
                 break;
-            };
+            }
+            let step = (from + around.rotate_right(from).trailing_zeros()) % 8;
             // Round when the first step is about to be taken again (Jacob's
             // criterion: passing the first pixel alone is not enough).
             if (x, y) == start {
@@ -78,11 +86,14 @@ impl Contour {
                 }
             }
             self.part.push([x as i32, y as i32]);
-            x = x.wrapping_add_signed(STEPS[step].0);
-            y = y.wrapping_add_signed(STEPS[step].1);
+            let (dx, dy) = STEPS[step as usize];
+            enclosed += (x as isize * dy - y as isize * dx) as i64;
+            x = x.wrapping_add_signed(dx);
+            y = y.wrapping_add_signed(dy);
             // Go on from the last neighbour known to be outside.
             from = (step + if step.is_multiple_of(2) { 6 } else { 5 }) % 8;
         }
+        enclosed
     }
 
     /// Follows the boundary, simplifies it so that no boundary pixel is farther
@@ -146,12 +157,19 @@ fn is_upper_end(mask: &[u8], width: usize, at: usize) -> bool {
             || (outside(x, y - 1) && outside(x + 1, y - 1) && (x == 0 || outside(x - 1, y - 1))))
 }
 
-/// Twice the enclosed area (shoelace formula), positive for a polygon that runs
-/// clockwise on the screen.
-fn doubled_area(polygon: &[[i32; 2]]) -> i64 {
-    let next = polygon.iter().cycle().skip(1);
-    let cross = |(a, b): (&[i32; 2], &[i32; 2])| {
-        i64::from(a[0]) * i64::from(b[1]) - i64::from(b[0]) * i64::from(a[1])
+/// One bit for each of [`STEPS`] that leads to a pixel inside.
+fn neighbours(mask: &[u8], width: usize, x: usize, y: usize) -> u8 {
+    // Of a row, the pixels to the west, here, and to the east.
+    let row = |y: usize| -> [bool; 3] {
+        let Some(row) = mask.get(y.wrapping_mul(width)..).and_then(|rows| rows.get(..width)) else {
+            return [false; 3];
+        };
+        match row.get(x.wrapping_sub(1)..).and_then(|row| row.first_chunk()) {
+            Some(near) => near.map(|pixel: u8| pixel != 0),
+            None => [x.wrapping_sub(1), x, x + 1].map(|x| row.get(x).is_some_and(|p| *p != 0)),
+        }
     };
-    polygon.iter().zip(next).map(cross).sum()
+    let ([nw, n, ne], [w, _, e], [sw, s, se]) = (row(y.wrapping_sub(1)), row(y), row(y + 1));
+    let inside = [e, se, s, sw, w, nw, n, ne];
+    (0..).zip(inside).fold(0, |bits, (i, inside)| bits | u8::from(inside) << i)
 }

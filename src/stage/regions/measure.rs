@@ -8,7 +8,7 @@ use crate::camera::StereoRig;
 use crate::image::Image;
 use crate::perception::Region;
 use crate::simd::Level;
-use crate::stage::depth::EPSILON_PX;
+use crate::stage::depth::{Depth, EPSILON_PX};
 use sums::{Centre, Sums};
 
 /// Standard deviation of a region's disparity that more pixels do not reduce:
@@ -30,7 +30,7 @@ const INLIER_SIGMAS: f32 = 3.0;
 /// What decides whether a candidate is a region, beside the region's own fields.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Evidence {
-    /// Mean confidence of the valid pixels; 0 when there is none.
+    /// Mean confidence of the valid pixels in every fourth row; 0 when there is none.
     pub mean_confidence: f32,
     /// Median disparity in pixels; NaN without a valid pixel.
     pub median_disparity: f32,
@@ -44,13 +44,14 @@ pub struct Evidence {
 #[derive(Debug)]
 pub struct Measure {
     level: Level,
+    depth: Depth,
     sample: Vec<f32>,
 }
 
 impl Measure {
-    /// The measuring with instructions of `level`.
-    pub fn new(level: Level) -> Self {
-        Self { level, sample: Vec::new() }
+    /// The measuring with instructions of `level`, of depths within the limits of `depth`.
+    pub fn new(level: Level, depth: Depth) -> Self {
+        Self { level, depth, sample: Vec::new() }
     }
 
     /// Fills box, mask and all measures of `region` from the pixels of `bounds`
@@ -85,6 +86,7 @@ impl Measure {
             u: (bounds.x0 + bounds.x1) as f32 / 2.0,
             v: (bounds.y0 + bounds.y1) as f32 / 2.0,
             tolerance: (INLIER_SIGMAS * spread).max(1.0),
+            limits: self.depth,
         };
         region.mask.clear();
         region.mask.resize(bounds.width() * bounds.height(), 0);
@@ -103,8 +105,8 @@ impl Measure {
         region.depth_stddev = deviation as f32;
         locate(bounds, &centre, &sums, source.rig, region);
         Evidence {
-            mean_confidence: if sums.valid > 0.0 {
-                (sums.confidence / sums.valid) as f32
+            mean_confidence: if sums.asked > 0.0 {
+                (sums.confidence / sums.asked) as f32
             } else {
                 0.0
             },
@@ -118,15 +120,15 @@ impl Measure {
     fn collect(&mut self, id: u32, bounds: &PixelBox, ids: &Image<u32>, source: &RegionSource<'_>) {
         let step = bounds.area.div_ceil(MOST_VALUES).max(1);
         self.sample.resize(bounds.height() * bounds.width().div_ceil(step), 0.0);
+        let scale = source.rig.depth_scale() as f32;
         let mut n = 0;
         for y in bounds.y0..bounds.y1 {
-            let [d, z] = [source.disparity, source.depth].map(|map| map.row(y));
-            let ids = ids.row(y);
+            let (d, ids) = (source.disparity.row(y), ids.row(y));
             let from = bounds.x0 + y * SHIFT % step;
             for x in (from..bounds.x1).step_by(step) {
                 // What does not count is written over: nobody can foresee what does.
                 self.sample[n] = d[x];
-                n += usize::from((ids[x] == id) & z[x].is_finite());
+                n += usize::from((ids[x] == id) & self.depth.of(d[x], scale).is_finite());
             }
         }
         self.sample.truncate(n);

@@ -1,14 +1,25 @@
 //! Polygons with fewer points.
 
+use crate::simd::{Level, dispatch};
+
+/// Points whose distances are reckoned side by side.
+const LANES: usize = 16;
+
 /// The simplification with its buffers. A stack of its own takes the place of
 /// recursion: boundaries may have as many points as the image has pixels.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Simplify {
+    level: Level,
     keep: Vec<bool>,
     stack: Vec<(usize, usize)>,
 }
 
 impl Simplify {
+    /// The simplification with instructions of `level`.
+    pub fn new(level: Level) -> Self {
+        Self { level, keep: Vec::new(), stack: Vec::new() }
+    }
+
     /// Which points of a closed polygon to keep so that no other one is farther
     /// than `tolerance_px` from the new outline (Ramer 1972, Douglas and Peucker
     /// 1973).
@@ -18,11 +29,7 @@ impl Simplify {
         self.keep.resize(n, false);
         let Some(&start) = points.first() else { return &self.keep };
         // A closed curve is cut at its first point and at the one farthest from it.
-        let opposite = (0..n).max_by_key(|&i| {
-            let (dx, dy) = (points[i][0] - start[0], points[i][1] - start[1]);
-            (i64::from(dx).pow(2) + i64::from(dy).pow(2), std::cmp::Reverse(i))
-        });
-        let opposite = opposite.unwrap_or(0);
+        let (_, opposite) = Line::new(start, start).farthest(self.level, points);
         self.keep[0] = true;
         self.keep[opposite] = true;
         let limit = f64::from(tolerance_px).powi(2);
@@ -30,15 +37,10 @@ impl Simplify {
         self.stack.extend([(0, opposite), (opposite, n)]);
         while let Some((from, to)) = self.stack.pop() {
             let line = Line::new(points[from], points[to % n]);
-            let mut worst = (0, from);
-            for (i, &point) in (from + 1..).zip(points.get(from + 1..to).unwrap_or_default()) {
-                let distance = line.scaled_distance(point);
-                if distance > worst.0 {
-                    worst = (distance, i);
-                }
-            }
-            if worst.0 as f64 > limit * line.scale as f64 {
-                let i = worst.1;
+            let between = points.get(from + 1..to).unwrap_or_default();
+            let (distance, at) = line.farthest(self.level, between);
+            if distance > limit * line.scale {
+                let i = from + 1 + at;
                 self.keep[i] = true;
                 self.stack.extend([(from, i), (i, to)]);
             }
@@ -54,33 +56,73 @@ impl Simplify {
     }
 }
 
-/// A segment between two points.
+/// A segment between two points. Whole numbers, in a form that vectors multiply:
+/// exact for images of up to 47 million pixels.
 struct Line {
-    from: [i64; 2],
-    along: [i64; 2],
+    from: [f64; 2],
+    along: [f64; 2],
     /// Its squared length, or 1 where it has none.
-    scale: i64,
+    scale: f64,
 }
 
 impl Line {
     fn new(from: [i32; 2], to: [i32; 2]) -> Self {
-        let (from, to) = (from.map(i64::from), to.map(i64::from));
+        let (from, to) = (from.map(f64::from), to.map(f64::from));
         let [x, y] = [to[0] - from[0], to[1] - from[1]];
-        Self { from, along: [x, y], scale: (x * x + y * y).max(1) }
+        Self { from, along: [x, y], scale: (x * x + y * y).max(1.0) }
+    }
+
+    /// The largest squared distance of `points` from the segment, square pixels,
+    /// times the scale, and the first of them that has it; (0, 0) without any.
+    fn farthest(&self, level: Level, points: &[[i32; 2]]) -> (f64, usize) {
+        dispatch!(level, _simd => self.farthest_of(points))
+    }
+
+    #[inline(always)]
+    fn farthest_of(&self, points: &[[i32; 2]]) -> (f64, usize) {
+        let mut worst = (0.0, 0);
+        let (groups, rest) = points.as_chunks::<LANES>();
+        for (group, points) in groups.iter().enumerate() {
+            let mut distances = [0.0; LANES];
+            for i in 0..LANES {
+                distances[i] = self.scaled_distance(points[i]);
+            }
+            let mut farther = false;
+            for distance in distances {
+                farther |= distance > worst.0;
+            }
+            if farther {
+                take_farthest(&distances, group * LANES, &mut worst);
+            }
+        }
+        for (i, point) in (groups.len() * LANES..).zip(rest) {
+            take_farthest(&[self.scaled_distance(*point)], i, &mut worst);
+        }
+        worst
     }
 
     /// Squared distance of a point from the segment, square pixels, times the
-    /// scale: whole numbers, so that nothing is divided.
-    fn scaled_distance(&self, point: [i32; 2]) -> i64 {
-        let [x, y] = [i64::from(point[0]) - self.from[0], i64::from(point[1]) - self.from[1]];
+    /// scale, so that nothing is divided.
+    #[inline(always)]
+    fn scaled_distance(&self, point: [i32; 2]) -> f64 {
+        let [x, y] = [f64::from(point[0]) - self.from[0], f64::from(point[1]) - self.from[1]];
         let [bx, by] = self.along;
         let along = x * bx + y * by;
-        if along <= 0 {
-            (x * x + y * y).saturating_mul(self.scale)
-        } else if along >= self.scale {
-            ((x - bx).pow(2) + (y - by).pow(2)).saturating_mul(self.scale)
-        } else {
-            (x * by - y * bx).saturating_pow(2)
+        let before = (x * x + y * y) * self.scale;
+        let behind = ((x - bx) * (x - bx) + (y - by) * (y - by)) * self.scale;
+        let beside = (x * by - y * bx) * (x * by - y * bx);
+        let end = if along <= 0.0 { before } else { behind };
+        if along > 0.0 && along < self.scale { beside } else { end }
+    }
+}
+
+/// Puts the first of the largest `distances`, whose points begin at `first`, in
+/// the place of a smaller one.
+#[inline(always)]
+fn take_farthest(distances: &[f64], first: usize, worst: &mut (f64, usize)) {
+    for (i, &distance) in (first..).zip(distances) {
+        if distance > worst.0 {
+            *worst = (distance, i);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::image::Image;
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::stage::depth::Depth;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::components::PixelBox;
 
@@ -10,6 +11,10 @@ use crate::stage::regions::components::PixelBox;
 const LANES: usize = 16;
 /// Rows whose sums are kept in single precision.
 const ROWS: usize = 32;
+/// One in so many rows is asked for its confidence.
+const ASKED: usize = 4;
+
+const _: () = assert!(ROWS.is_multiple_of(ASKED));
 
 /// Where things are about: sums of differences from here keep their precision
 /// in few bits.
@@ -25,6 +30,8 @@ pub struct Centre {
     pub v: f32,
     /// Largest difference from `disparity` of a pixel that counts for the position.
     pub tolerance: f32,
+    /// What depths are finite.
+    pub limits: Depth,
 }
 
 /// Sums over the pixels of a region; d, z, u and v are differences from the [`Centre`].
@@ -39,8 +46,10 @@ pub struct Sums {
     /// Over all pixels.
     pub saliency: f64,
     pub max_saliency: f32,
-    /// Over those with disparity.
+    /// Over those with disparity in every fourth row, and their number.
     pub confidence: f64,
+    pub asked: f64,
+    /// Over those with disparity.
     pub disparity: [f64; 2],
     /// Over those with finite depth: z and z².
     pub depth: [f64; 2],
@@ -67,9 +76,70 @@ impl Sums {
             let rows = PixelBox { y0: upper, y1: (upper + ROWS).min(bounds.y1), ..*bounds };
             let at = (upper - bounds.y0) * bounds.width();
             let mask = &mut mask[at..at + rows.height() * rows.width()];
-            dispatch!(level, simd => sums.add(simd, id, &rows, ids, source, centre, mask));
+            dispatch!(level, simd => {
+                sums.add_saliency(simd, id, &rows, ids, source.saliency);
+                sums.add_confidence(simd, id, &rows, ids, source);
+                sums.add(simd, id, &rows, ids, source, centre, mask);
+            });
         }
         sums
+    }
+
+    /// By itself: the map was written long ago, and of a short loop many pixels
+    /// are fetched at once.
+    #[inline(always)]
+    fn add_saliency<S: Simd>(
+        &mut self,
+        simd: S,
+        id: u32,
+        rows: &PixelBox,
+        ids: &Image<u32>,
+        map: &Image<f32>,
+    ) {
+        let zero = f32x16::splat(simd, 0.0);
+        let own = u32x16::splat(simd, id);
+        let [mut sum, mut most] = [zero; 2];
+        for y in rows.y0..rows.y1 {
+            let (ids, map) = (ids.row(y), map.row(y));
+            for x in (rows.x0..rows.x1).step_by(LANES) {
+                let inside = u32x16::from_slice(simd, &load(ids, x)).simd_eq(own);
+                let s = inside.select(f32x16::from_slice(simd, &load(map, x)), zero);
+                sum += s;
+                most = most.max(s);
+            }
+        }
+        self.saliency += total(sum);
+        for value in most.as_slice() {
+            self.max_saliency = self.max_saliency.max(*value);
+        }
+    }
+
+    /// Of some rows: it is only asked whether the mean is very low.
+    #[inline(always)]
+    fn add_confidence<S: Simd>(
+        &mut self,
+        simd: S,
+        id: u32,
+        rows: &PixelBox,
+        ids: &Image<u32>,
+        source: &RegionSource<'_>,
+    ) {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let own = u32x16::splat(simd, id);
+        let [mut sum, mut asked] = [zero; 2];
+        for y in (rows.y0..rows.y1).step_by(ASKED) {
+            let (ids, d) = (ids.row(y), source.disparity.row(y));
+            let confidence = source.confidence.row(y);
+            for x in (rows.x0..rows.x1).step_by(LANES) {
+                let inside = u32x16::from_slice(simd, &load(ids, x)).simd_eq(own);
+                let d = f32x16::from_slice(simd, &load(d, x));
+                let known = inside & d.simd_eq(d);
+                sum += known.select(f32x16::from_slice(simd, &load(confidence, x)), zero);
+                asked += known.select(one, zero);
+            }
+        }
+        self.confidence += total(sum);
+        self.asked += total(asked);
     }
 
     #[inline(always)]
@@ -89,17 +159,14 @@ impl Sums {
         let most = f32x16::splat(simd, f32::MAX);
         let own = u32x16::splat(simd, id);
         let [mut area, mut valid, mut finite, mut inliers] = [zero; 4];
-        let [mut saliency, mut max_saliency, mut confidence] = [zero; 3];
         let [mut d1, mut d2, mut z1, mut z2] = [zero; 4];
         let [mut u1, mut u2, mut v1, mut v2, mut e1, mut e2] = [zero; 6];
         let [mut w, mut uw, mut vw] = [zero; 3];
         let lane = f32x16::from_fn(simd, |i| i as f32);
+        let depth_scale = source.rig.depth_scale() as f32;
         for (y, mask) in (rows.y0..rows.y1).zip(mask.chunks_exact_mut(rows.width())) {
             let v = f32x16::splat(simd, y as f32 - centre.v);
-            let [s_row, c_row, d_row, z_row] =
-                [source.saliency, source.confidence, source.disparity, source.depth]
-                    .map(|m| m.row(y));
-            let id_row = ids.row(y);
+            let (d_row, id_row) = (source.disparity.row(y), ids.row(y));
             for (x, mask) in (rows.x0..).step_by(LANES).zip(mask.chunks_mut(LANES)) {
                 // Beyond the box there is no pixel of this id.
                 let at = load(id_row, x);
@@ -116,18 +183,13 @@ impl Sums {
                         *mask = if at == id { 255 } else { 0 };
                     }
                 }
-                let s = inside.select(f32x16::from_slice(simd, &load(s_row, x)), zero);
-                let c = f32x16::from_slice(simd, &load(c_row, x));
                 let d = f32x16::from_slice(simd, &load(d_row, x));
-                let z = f32x16::from_slice(simd, &load(z_row, x));
+                let z = centre.limits.of_lanes(simd, d, depth_scale);
                 area += inside.select(one, zero);
-                saliency += s;
-                max_saliency = max_saliency.max(s);
 
                 let known = inside & d.simd_eq(d);
                 let d = known.select(d - centre.disparity, zero);
                 valid += known.select(one, zero);
-                confidence += known.select(c, zero);
                 d1 += d;
                 d2 += d * d;
 
@@ -158,11 +220,6 @@ impl Sums {
         self.valid += total(valid);
         self.finite += total(finite);
         self.inliers += total(inliers);
-        self.saliency += total(saliency);
-        self.confidence += total(confidence);
-        for value in max_saliency.as_slice() {
-            self.max_saliency = self.max_saliency.max(*value);
-        }
         add(&mut self.disparity, [d1, d2]);
         add(&mut self.depth, [z1, z2]);
         add(&mut self.place[0], [u1, u2]);
