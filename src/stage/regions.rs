@@ -44,12 +44,13 @@ const MAX_SPREAD_PART: f32 = 0.4;
 const LEAST_WEIGHT: f32 = 0.05;
 /// Least confidence of a region on a plane, for which it is calibrated: what is seen
 /// by one camera only beside a thing is small and has few disparities.
-const LEAST_CONFIDENCE: f32 = 0.2;
+const LEAST_CONFIDENCE: f32 = 0.31;
 /// Weights of the confidence: logistic regression on 800 regions of a rendered
-/// street, a rendered table and photographed tables; calibration error .06 on the
-/// street and .04 on the tables, .13 on the street when that is left out of the
-/// regression and .07 on the tables when those are.
-const CERTAINTY: f32 = -4.1;
+/// street, a rendered table and photographed tables (calibration error .13 on the
+/// street when that is left out of the regression, .07 on the tables when those
+/// are); the first one raised since, as fewer regions are none: .04 on the street,
+/// .02 on the rendered table.
+const CERTAINTY: f32 = -3.5;
 const PER_AREA: f32 = 1.1;
 const PER_VALID: f32 = 5.4;
 /// Distance at which nearness is one half, in metres.

@@ -18,14 +18,14 @@ pub const WIDE: usize = 2;
 pub const HIGH: usize = 4;
 /// Share of its columns from which a thing that goes on upward is part of a
 /// building, if it is wider than a trunk or a pole, metres.
-const MOST_TALL: f32 = 0.5;
+const MOST_TALL: f32 = 0.45;
 const TRUNK_M: f32 = 1.2;
 /// A thing reaches at least this height, metres (of a road scene).
 const LEAST_TOP_M: f32 = 0.35;
 /// and this part of its length: a bank of earth or a kerb is lower.
 const LEAST_RISE: f32 = 0.1;
 /// Share of a thing's columns that must reach the ground.
-const LEAST_CONTACT: f32 = 0.2;
+const LEAST_CONTACT: f32 = 0.3;
 /// Share of a thing's cells that its box leaves out on every side.
 const TRIM: f32 = 0.04;
 /// Cells beside a thing in which its background is looked for.

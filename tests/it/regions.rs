@@ -379,7 +379,7 @@ fn statistics_follow_their_plain_formulas() {
     near(r.far_depth, percentile(0.95));
     near(r.mean_saliency, 0.8);
     near(r.max_saliency, 0.8);
-    let score = -4.1 + 1.1 * (pixels.len() as f64 / 1000.0).ln() + 5.4 * n / pixels.len() as f64;
+    let score = -3.5 + 1.1 * (pixels.len() as f64 / 1000.0).ln() + 5.4 * n / pixels.len() as f64;
     near(r.confidence, 1.0 / (1.0 + (-score).exp()));
     assert_eq!(r.mask.len(), 31 * 23);
     assert_eq!(r.mask.iter().filter(|m| **m != 0).count(), pixels.len());

@@ -14,6 +14,9 @@ const CONTACT_M: f32 = 0.6;
 const TALL_M: f32 = 4.2;
 /// Cells without disparity that a segment may span.
 const MAX_HOLES: usize = 2;
+/// Cells of a segment, at least: what is shorter is a mixture of two surfaces at
+/// an edge as a rule, or noise. Of streets half of all segments are.
+const LEAST_CELLS: u32 = 3;
 /// Cells above a segment among which the next disparity is looked for.
 const LOOK_UP: usize = 6;
 /// Largest distance of a cell from its segment's mean disparity, in parts: the bonnet
@@ -146,7 +149,9 @@ impl<'a> Column<'a> {
             next = loop {
                 let mut s = self.start(y, contact_m, carried);
                 let end = self.grow(&mut s);
-                out.push(s);
+                if s.cells >= LEAST_CELLS {
+                    out.push(s);
+                }
                 let Some((above, gap)) = end else { break None };
                 if !is_set(self.bits.evidence, above) {
                     break last_set(self.bits.evidence, above);
