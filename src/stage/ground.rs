@@ -1,6 +1,7 @@
 //! The plane that things stand on.
 
 pub(super) mod plane;
+pub(super) mod running;
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
@@ -8,6 +9,7 @@ use crate::stage::coarse::CELL;
 
 pub use plane::Plane;
 use plane::{Draws, Fit, Measured, normal, through};
+use running::RunningPlane;
 
 /// Strips into which the view is cut from left to right.
 const STRIPS: usize = 16;
@@ -28,12 +30,6 @@ const LEAST_SPAN: f32 = 4.0;
 const LOWER_PART: f32 = 0.6;
 /// One in so many cells votes on the first guesses.
 const SKIP: usize = 4;
-/// Frames without support after which the last plane is given up.
-const PATIENCE: u32 = 10;
-/// Share of the new plane in the running one, and the relative change of the
-/// camera's height over which it is another plane.
-const RENEWAL: f32 = 0.5;
-const MAX_STEP: f32 = 0.25;
 /// Planes tried per frame when there is none yet, and when there is one.
 const TRIALS: usize = 240;
 const TRIALS_NEAR: usize = 48;
@@ -139,9 +135,7 @@ impl Sample {
 /// The estimator of the ground plane, with its memory of the last one.
 #[derive(Debug, Default)]
 pub struct Ground {
-    plane: Option<Plane>,
-    state: GroundState,
-    failures: u32,
+    running: RunningPlane,
     votes: Vec<Vote>,
     sample: Sample,
     /// Disparities of the plane where cells lie on it.
@@ -157,19 +151,21 @@ fn tolerance(disparity: f32) -> f32 {
 impl Ground {
     /// Forgets the last plane.
     pub fn reset(&mut self) {
-        self.plane = None;
-        self.state = GroundState::None;
-        self.failures = 0;
+        self.running.reset();
     }
 
     /// The plane in use.
-    pub fn plane(&self) -> Option<&Plane> {
-        self.plane.as_ref()
+    pub const fn plane(&self) -> Option<&Plane> {
+        self.running.get()
     }
 
     /// Where it comes from.
-    pub fn state(&self) -> GroundState {
-        self.state
+    pub const fn state(&self) -> GroundState {
+        match self.plane() {
+            None => GroundState::None,
+            Some(_) if self.running.is_held() => GroundState::Held,
+            Some(_) => GroundState::Measured,
+        }
     }
 
     /// Looks for the plane in the checked disparity of each cell (full-size
@@ -183,27 +179,9 @@ impl Ground {
     pub fn run(&mut self, checked: &Image<f32>, rig: &StereoRig) {
         self.collect(checked, rig);
         let found = self.search(rig).and_then(|plane| self.refine(plane, rig));
-        let threshold = if self.plane.is_some() { KEEP } else { ACQUIRE };
-        let accepted = found.filter(|(_, support)| *support >= threshold).map(|(plane, _)| plane);
-        match (accepted, &mut self.plane) {
-            (Some(new), Some(old)) => {
-                // A camera that nods moves the plane; an EMA takes the noise
-                // out, but a plane that is elsewhere is taken as it is.
-                let step = (new.camera_height_m / old.camera_height_m - 1.0).abs();
-                let share = if step < MAX_STEP { RENEWAL } else { 1.0 };
-                *old = old.mixed(&new, share, rig);
-                (self.state, self.failures) = (GroundState::Measured, 0);
-            }
-            (Some(new), none) => {
-                *none = Some(new);
-                (self.state, self.failures) = (GroundState::Measured, 0);
-            }
-            (None, Some(_)) if self.failures < PATIENCE => {
-                self.failures += 1;
-                self.state = GroundState::Held;
-            }
-            (None, _) => self.reset(),
-        }
+        let threshold = if self.plane().is_some() { KEEP } else { ACQUIRE };
+        let shown = found.filter(|(_, support)| *support >= threshold);
+        self.running.update(shown.map(|(plane, _)| plane), rig);
     }
 
     fn collect(&mut self, checked: &Image<f32>, rig: &StereoRig) {
@@ -239,11 +217,11 @@ impl Ground {
                 }
             }
         };
-        consider(self.plane);
+        consider(self.plane().copied());
         let mut draws = Draws::new();
         let lower = ((n as f32 * LOWER_PART) as usize).max(1);
         let mut random = || self.votes[n - 1 - draws.below(lower)].cell;
-        let trials = if self.plane.is_some() { TRIALS_NEAR } else { TRIALS };
+        let trials = if self.plane().is_some() { TRIALS_NEAR } else { TRIALS };
         for trial in 0..trials {
             let (p, q) = (random(), random());
             // Two cells give a level plane, which is nearly always right and

@@ -3,6 +3,7 @@
 use crate::camera::StereoRig;
 use crate::image::Image;
 use crate::stage::ground::plane::{Draws, Fit, Measured, through};
+use crate::stage::ground::running::RunningPlane;
 use crate::stage::ground::{GroundState, Plane, cell_centre};
 
 /// Spread of the coarse disparity about a plane in pixels (one standard
@@ -27,12 +28,6 @@ const ACQUIRE: f32 = 0.43;
 /// The same to go on with the last plane.
 const KEEP: f32 = 0.25;
 const BELOW: f32 = 0.5;
-/// Frames without support after which the last plane is given up.
-const PATIENCE: u32 = 10;
-/// Share of the new plane in the running one, and the relative change of
-/// distance over which it is another plane.
-const RENEWAL: f32 = 0.5;
-const MAX_STEP: f32 = 0.25;
 /// Planes tried in a frame without a known one.
 const TRIALS: usize = 300;
 /// Most cells that vote on them.
@@ -54,9 +49,7 @@ const LEAST_EXTENT: f32 = 0.3;
 /// The estimator of a plane seen from above, with its memory of the last one.
 #[derive(Debug, Default)]
 pub struct Table {
-    plane: Option<Plane>,
-    state: GroundState,
-    failures: u32,
+    running: RunningPlane,
     /// The firm cells.
     votes: Vec<Measured>,
     seen: Vec<f32>,
@@ -65,19 +58,21 @@ pub struct Table {
 impl Table {
     /// Forgets the last plane.
     pub fn reset(&mut self) {
-        self.plane = None;
-        self.state = GroundState::None;
-        self.failures = 0;
+        self.running.reset();
     }
 
     /// The plane in use.
-    pub fn plane(&self) -> Option<&Plane> {
-        self.plane.as_ref()
+    pub const fn plane(&self) -> Option<&Plane> {
+        self.running.get()
     }
 
     /// Where it comes from.
-    pub fn state(&self) -> GroundState {
-        self.state
+    pub const fn state(&self) -> GroundState {
+        match self.plane() {
+            None => GroundState::None,
+            Some(_) if self.running.is_held() => GroundState::TableHeld,
+            Some(_) => GroundState::Table,
+        }
     }
 
     /// Looks for the plane in the checked disparity of each cell (full-size
@@ -88,26 +83,14 @@ impl Table {
     /// candidate counts against it. While the last plane has support none is searched.
     pub fn run(&mut self, checked: &Image<f32>, rig: &StereoRig) {
         let asked = self.collect(checked, rig);
-        let known = self.plane.filter(|_| asked).and_then(|last| self.refine(last, checked, rig));
-        let accepted = known.filter(|(_, support)| *support >= KEEP).or_else(|| {
+        let last = self.plane().copied().filter(|_| asked);
+        let known = last.and_then(|last| self.refine(last, checked, rig));
+        let shown = known.filter(|(_, support)| *support >= KEEP).or_else(|| {
             let found = if asked { self.search(rig) } else { None };
             let found = found.and_then(|plane| self.refine(plane, checked, rig));
             found.filter(|(_, support)| *support >= ACQUIRE)
         });
-        let accepted = accepted.map(|(plane, _)| plane);
-        if let Some(new) = accepted {
-            let next = self.plane.and_then(|old| {
-                let step = (new.camera_height_m / old.camera_height_m - 1.0).abs();
-                (step < MAX_STEP).then(|| old.mixed(&new, RENEWAL, rig))
-            });
-            self.plane = Some(next.unwrap_or(new));
-            (self.state, self.failures) = (GroundState::Table, 0);
-        } else if self.plane.is_some() && self.failures < PATIENCE {
-            self.failures += 1;
-            self.state = GroundState::TableHeld;
-        } else {
-            self.reset();
-        }
+        self.running.update(shown.map(|(plane, _)| plane), rig);
     }
 
     /// Gathers firm cells; false with too few.
