@@ -20,6 +20,8 @@ pub struct Persistence {
     share: f32,
     threshold: Option<f32>,
     gain: Image<f32>,
+    /// Attention and mark of each cell of the frame before.
+    past: Vec<[f32; 2]>,
 }
 
 impl Persistence {
@@ -33,6 +35,7 @@ impl Persistence {
             share: saliency.temporal_smoothing as f32,
             threshold: stays.then_some(saliency.threshold as f32),
             gain: Image::default(),
+            past: Vec::new(),
         }
     }
 
@@ -46,12 +49,17 @@ impl Persistence {
     /// with the flow's trust, so that a new thing is attended to at once.
     pub fn smooth(&mut self, attention: &mut Image<f32>, before: &PreviousFrame, flow: &Flow) {
         self.gain.resize(attention.size());
-        let Self { level, share, gain, .. } = self;
-        if before.attended.size() == attention.size() {
-            dispatch!(*level, simd => smooth::<_, true>(simd, attention, before, flow, *share, gain));
-        } else {
+        let kept = before.attended.size() == attention.size();
+        let Self { level, share, gain, past, .. } = self;
+        past.resize(attention.size().area(), [0.0; 2]);
+        // Without marks the first map stands in for them, and says nothing.
+        let marks = if kept { &before.attended } else { &before.attention };
+        dispatch!(*level, simd => {
+            pair(before.attention.pixels(), marks.pixels(), past);
+            smooth(simd, attention, past, flow, *share, gain);
+        });
+        if !kept {
             gain.fill(0.0);
-            dispatch!(*level, simd => smooth::<_, false>(simd, attention, before, flow, *share, gain));
         }
     }
 
@@ -77,12 +85,20 @@ impl Persistence {
 /// Cells that are smoothed at once.
 const LANES: usize = 16;
 
-/// Smooths the map, and where the marks are `KEPT` fills what each cell gains.
+/// Puts the values of two maps side by side.
 #[inline(always)]
-fn smooth<S: Simd, const KEPT: bool>(
+fn pair(first: &[f32], second: &[f32], out: &mut [[f32; 2]]) {
+    for ((out, first), second) in out.iter_mut().zip(first).zip(second) {
+        *out = [*first, *second];
+    }
+}
+
+/// Smooths the map, and fills what each cell gains.
+#[inline(always)]
+fn smooth<S: Simd>(
     simd: S,
     attention: &mut Image<f32>,
-    before: &PreviousFrame,
+    past: &[[f32; 2]],
     flow: &Flow,
     share: f32,
     gain: &mut Image<f32>,
@@ -95,12 +111,9 @@ fn smooth<S: Simd, const KEPT: bool>(
             let here = f32x16::from_fn(simd, |i| (x + i) as f32);
             let place = Place::new(size, here + dx, dy + y as f32);
             let now = load(simd, attention.row(y), x);
-            let past = place.of(simd, before.attention.pixels());
+            let [past, attended] = place.of(simd, past);
             store(attention.row_mut(y), x, now + trust * share * (past - now));
-            if KEPT {
-                let attended = place.of(simd, before.attended.pixels());
-                store(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
-            }
+            store(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
         }
     }
 }
@@ -147,33 +160,44 @@ impl<S: Simd> Place<S> {
         Self { at: row * width as u32 + column, width, fx: x - x0, fy: y - y0 }
     }
 
-    /// Bilinear values. The pixels are fetched one place after the other; what
+    /// Bilinear values of two maps. The cells are fetched one place after the other; what
     /// is right of the last column or below the last row has no share.
     #[inline(always)]
-    fn of(&self, simd: S, pixels: &[f32]) -> f32x16<S> {
-        let [mut upper, mut lower] = [[[0.0; 2]; LANES]; 2];
+    fn of(&self, simd: S, cells: &[[f32; 2]]) -> [f32x16<S>; 2] {
+        let [mut upper, mut lower] = [[[0.0; 4]; LANES]; 2];
         for (i, at) in self.at.as_slice().iter().enumerate() {
             let (at, below) = (*at as usize, *at as usize + self.width);
-            upper[i] = pair(pixels, at);
-            lower[i] = if below < pixels.len() { pair(pixels, below) } else { upper[i] };
+            upper[i] = beside(cells, at);
+            lower[i] = if below < cells.len() { beside(cells, below) } else { upper[i] };
         }
         let upper = self.across(simd, &upper);
         let lower = self.across(simd, &lower);
-        upper + self.fy * (lower - upper)
+        let [first, second] = upper;
+        [first + self.fy * (lower[0] - first), second + self.fy * (lower[1] - second)]
     }
 
-    /// Between the two of each pair.
+    /// Of both maps between a cell and the next one.
     #[inline(always)]
-    fn across(&self, simd: S, pairs: &[[f32; 2]; LANES]) -> f32x16<S> {
-        let (first, second) = pairs.as_flattened().split_at(LANES);
-        let first = f32x16::from_slice(simd, first);
-        let (from, to) = first.deinterleave(f32x16::from_slice(simd, second));
-        from + self.fx * (to - from)
+    fn across(&self, simd: S, cells: &[[f32; 4]; LANES]) -> [f32x16<S>; 2] {
+        let quarters = cells.as_flattened().as_chunks::<LANES>().0;
+        let mut parts = [f32x16::splat(simd, 0.0); 4];
+        for (part, quarter) in parts.iter_mut().zip(quarters) {
+            *part = f32x16::from_slice(simd, quarter);
+        }
+        let (left, right) = (parts[0].deinterleave(parts[1]), parts[2].deinterleave(parts[3]));
+        // The first map's cells and the next ones, by turns; the same of the second.
+        let (first, first_next) = left.0.deinterleave(right.0);
+        let (second, second_next) = left.1.deinterleave(right.1);
+        [first + self.fx * (first_next - first), second + self.fx * (second_next - second)]
     }
 }
 
-/// A pixel and the next one; twice the last one.
+/// A cell of two maps and the next one; twice the last one.
 #[inline(always)]
-fn pair(pixels: &[f32], at: usize) -> [f32; 2] {
-    if let Some(pair) = pixels[at..].first_chunk() { *pair } else { [pixels[at]; 2] }
+fn beside(cells: &[[f32; 2]], at: usize) -> [f32; 4] {
+    let [[a, b], [c, d]] = match cells[at..].first_chunk() {
+        Some(pair) => *pair,
+        None => [cells[at]; 2],
+    };
+    [a, b, c, d]
 }
