@@ -175,8 +175,8 @@ impl Pipeline {
         lap.mark(&mut out.times, Stage::Depth);
 
         let source = RegionSource {
-            rgb: &out.left.rgb,
-            saliency: &out.saliency,
+            left: &out.left,
+            attention: &self.attention,
             roi: &out.roi,
             disparity: &out.disparity,
             coarse: &self.coarse_disparity,

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
-use crate::perception::{Region, RegionList, Rejections, RoiMask};
+use crate::perception::{Region, RegionList, Rejections, RoiMask, View};
 use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::depth::Depth;
@@ -56,13 +56,14 @@ const PER_VALID: f32 = 5.4;
 /// Distance at which nearness is one half, in metres.
 const NEAR_M: f32 = 10.0;
 
-/// What regions are made from; all images have the same size.
+/// What regions are made from; all images but the attention map have the same size.
 #[derive(Clone, Copy)]
 pub struct RegionSource<'a> {
     /// The left view.
-    pub rgb: &'a Image<[u8; 3]>,
-    /// Attention map.
-    pub saliency: &'a Image<f32>,
+    pub left: &'a View,
+    /// Attention per cell; that of a pixel is what [`upsample`](super::saliency::upsample)
+    /// makes of it.
+    pub attention: &'a Image<f32>,
     /// Region of interest.
     pub roi: &'a RoiMask,
     /// Disparity in pixels, NaN where there is none.

@@ -26,7 +26,7 @@ pub mod persistence;
 pub mod scene;
 pub mod spectral_residual;
 pub mod structure;
-mod upsample;
+pub(in crate::stage) mod upsample;
 
 pub use cells::shrink_view;
 pub use upsample::upsample;

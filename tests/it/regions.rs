@@ -7,12 +7,13 @@ use proptest::prelude::*;
 use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
-use salient_stereo::perception::{RegionList, Rejections, RoiMask};
+use salient_stereo::perception::{RegionList, Rejections, RoiMask, View};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::regions::components::{Candidates, Components, agree};
 use salient_stereo::stage::regions::contour::Contour;
 use salient_stereo::stage::regions::{RegionSource, Regions, priority};
+use salient_stereo::stage::saliency::upsample;
 
 const F: f64 = 100.0;
 const BASELINE: f64 = 0.5;
@@ -276,7 +277,7 @@ fn segment_distance(p: [f32; 2], a: [f32; 2], b: [f32; 2]) -> f32 {
 struct Boxes {
     size: Size,
     salient: Image<u8>,
-    saliency: Image<f32>,
+    attention: Image<f32>,
     disparity: Image<f32>,
     confidence: Image<f32>,
 }
@@ -287,7 +288,7 @@ impl Boxes {
         Self {
             size,
             salient: Image::new(size),
-            saliency: Image::filled(size, 0.2),
+            attention: Image::filled(size.divided_by(4), 0.8),
             disparity: Image::filled(size, f32::NAN),
             confidence: Image::filled(size, 0.9),
         }
@@ -297,7 +298,6 @@ impl Boxes {
         for v in y..y + h {
             for u in x..x + w {
                 self.salient.set(u, v, 255);
-                self.saliency.set(u, v, 0.8);
                 self.disparity.set(u, v, d(u, v));
             }
         }
@@ -308,8 +308,8 @@ impl Boxes {
         let roi =
             RoiMask { salient: self.salient.clone(), matched: self.salient.clone(), fraction: 0.5 };
         let source = RegionSource {
-            rgb: &Image::new(self.size),
-            saliency: &self.saliency,
+            left: &View::default(),
+            attention: &self.attention,
             roi: &roi,
             disparity: &self.disparity,
             coarse: &CoarseDisparity::default(),
@@ -342,6 +342,8 @@ fn statistics_follow_their_plain_formulas() {
         if hole(u, v) { f32::NAN } else { 12.0 + 0.05 * (u as f32 - 20.0) + 0.02 * v as f32 }
     });
     scene.disparity.set(30, 15, 0.5);
+    scene.attention =
+        Image::from_fn(scene.attention.size(), |x, y| 0.6 + ((x * 7 + y * 5) % 11) as f32 * 0.03);
     let (labels, regions, rejections) = scene.run(&Config::default());
     assert_eq!(
         (regions.len(), rejections.total()),
@@ -377,8 +379,11 @@ fn statistics_follow_their_plain_formulas() {
     near(r.near_depth, percentile(0.05));
     near(r.median_depth, percentile(0.5));
     near(r.far_depth, percentile(0.95));
-    near(r.mean_saliency, 0.8);
-    near(r.max_saliency, 0.8);
+    let mut saliency = Image::default();
+    upsample(simd::detect(), &scene.attention, scene.size, &mut saliency);
+    let s: Vec<f64> = pixels.iter().map(|&i| f64::from(saliency.pixels()[i])).collect();
+    near(r.mean_saliency, s.iter().sum::<f64>() / s.len() as f64);
+    near(r.max_saliency, s.iter().copied().fold(0.0, f64::max));
     let score = -3.5 + 1.1 * (pixels.len() as f64 / 1000.0).ln() + 5.4 * n / pixels.len() as f64;
     near(r.confidence, 1.0 / (1.0 + (-score).exp()));
     assert_eq!(r.mask.len(), 31 * 23);

@@ -210,8 +210,8 @@ fn regions_on(plane: &Plane, disparity: &Image<f32>) -> (RegionList, Rejections)
     let salient = Image::filled(SIZE, 255);
     let config = Config::default();
     let source = RegionSource {
-        rgb: &Image::new(SIZE),
-        saliency: &Image::filled(SIZE, 0.8),
+        left: &View::default(),
+        attention: &Image::filled(SIZE.divided_by(4), 0.8),
         roi: &RoiMask { salient: salient.clone(), matched: salient, fraction: 1.0 },
         disparity,
         coarse: &CoarseDisparity::default(),

@@ -9,7 +9,7 @@ use crate::image::Image;
 use crate::perception::Region;
 use crate::simd::Level;
 use crate::stage::depth::{Depth, EPSILON_PX};
-use sums::{Centre, Sums};
+use sums::{Centre, Out, Sums};
 
 /// Standard deviation of a region's disparity that more pixels do not reduce:
 /// sub-pixel bias and calibration, in pixels.
@@ -46,12 +46,13 @@ pub struct Measure {
     level: Level,
     depth: Depth,
     sample: Vec<f32>,
+    row: Vec<f32>,
 }
 
 impl Measure {
     /// The measuring with instructions of `level`, of depths within the limits of `depth`.
     pub fn new(level: Level, depth: Depth) -> Self {
-        Self { level, depth, sample: Vec::new() }
+        Self { level, depth, sample: Vec::new(), row: Vec::new() }
     }
 
     /// Fills box, mask and all measures of `region` from the pixels of `bounds`
@@ -90,7 +91,8 @@ impl Measure {
         };
         region.mask.clear();
         region.mask.resize(bounds.width() * bounds.height(), 0);
-        let sums = Sums::of(self.level, id, bounds, ids, source, &centre, &mut region.mask);
+        let out = Out { mask: &mut region.mask, row: &mut self.row };
+        let sums = Sums::of(self.level, id, bounds, ids, source, &centre, out);
 
         region.area = sums.area as u32;
         region.mean_saliency = (sums.saliency / sums.area) as f32;

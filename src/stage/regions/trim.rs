@@ -10,6 +10,7 @@
 use super::components::{Candidates, PixelBox};
 use super::runs::run;
 use crate::image::Image;
+use crate::perception::View;
 use crate::simd::{LANES, Level, Simd, abs_diff, dispatch, load, prelude::*, u8x32, u16x16};
 
 /// Width in metres (of a road scene) up to which a thing is narrow: a person
@@ -28,11 +29,13 @@ const ASIDE: usize = 2;
 /// How much nearer that must be to hide a part of the thing, in parts of the disparity.
 const NEARER: f32 = 1.1;
 
-/// Places where an edge may be, and the bytes that are read for all of them: from
-/// the pixel before, three times one vector, the last of them two pixels and two
-/// channels further on.
-const PLACES: usize = MOST_PX + 1;
-const READ: usize = LANES + 2 * 3 + 2;
+/// Places where an edge may be, in whole groups of eight, and the pixels that are
+/// read for all of them: from the one before to the one behind.
+const PLACES: usize = (MOST_PX + 1).next_multiple_of(8);
+const READ: usize = PLACES + 2;
+/// The bytes of colours that are read: three times one vector, the last of them two
+/// pixels and two channels further on.
+const READ_COLOR: usize = LANES + 2 * 3 + 2;
 
 // The edges of all places fit into a vector.
 const _: () = assert!(3 * (PLACES - 1) < LANES);
@@ -41,7 +44,7 @@ const _: () = assert!(3 * (PLACES - 1) < LANES);
 #[derive(Clone, Copy)]
 pub struct Trim<'a> {
     /// The image that the masks belong to.
-    pub rgb: &'a Image<[u8; 3]>,
+    pub left: &'a View,
     /// Disparity in pixels, NaN where there is none.
     pub disparity: &'a Image<f32>,
     /// Disparity of the thing.
@@ -99,12 +102,44 @@ impl Trim<'_> {
     /// The edges at the pixels from `x` on, added up over the rows around `y`.
     #[inline(always)]
     fn edges<S: Simd>(&self, simd: S, x: usize, y: usize) -> [u16; PLACES] {
-        let rows = y.saturating_sub(BAND)..(y + BAND + 1).min(self.rgb.height());
+        if self.left.is_gray { self.gray_edges(x, y) } else { self.color_edges(simd, x, y) }
+    }
+
+    /// The same of a view without colours.
+    #[inline(always)]
+    fn gray_edges(&self, x: usize, y: usize) -> [u16; PLACES] {
+        let rows = y.saturating_sub(BAND)..(y + BAND + 1).min(self.left.gray.height());
+        let mut sums = [0; PLACES];
+        for y in rows.step_by(2) {
+            let row = self.left.gray.row(y);
+            if let Some(near) =
+                row.get(x.wrapping_sub(1)..).and_then(|row| row.first_chunk::<READ>())
+            {
+                for i in 0..PLACES {
+                    sums[i] += u16::from(near[i].abs_diff(near[i + 2]));
+                }
+            } else {
+                let last = row.len() - 1;
+                for (x, sum) in (x..=last).zip(&mut sums) {
+                    let (before, after) = (row[x.saturating_sub(1)], row[(x + 1).min(last)]);
+                    *sum += u16::from(before.abs_diff(after));
+                }
+            }
+        }
+        sums
+    }
+
+    /// The same of colours.
+    #[inline(always)]
+    fn color_edges<S: Simd>(&self, simd: S, x: usize, y: usize) -> [u16; PLACES] {
+        let rgb = &self.left.rgb;
+        let rows = y.saturating_sub(BAND)..(y + BAND + 1).min(rgb.height());
         let mut sums = [0; PLACES];
         let before = x.wrapping_sub(1).wrapping_mul(3);
-        if self.rgb.row(y).as_flattened().get(before..before.saturating_add(READ)).is_none() {
+        let (own, read) = (rgb.row(y).as_flattened(), before..before.saturating_add(READ_COLOR));
+        if own.get(read.clone()).is_none() {
             for y in rows.step_by(2) {
-                let row = self.rgb.row(y);
+                let row = rgb.row(y);
                 let last = row.len() - 1;
                 for (x, sum) in (x..=last).zip(&mut sums) {
                     let (before, after) = (row[x.saturating_sub(1)], row[(x + 1).min(last)]);
@@ -116,7 +151,7 @@ impl Trim<'_> {
         }
         let [mut low, mut high] = [u16x16::splat(simd, 0); 2];
         for y in rows.step_by(2) {
-            let row = &self.rgb.row(y).as_flattened()[before..before + READ];
+            let row = &rgb.row(y).as_flattened()[read.clone()];
             let mut most = u8x32::splat(simd, 0);
             for channel in 0..3 {
                 let (before, after) = (load(simd, row, channel), load(simd, row, channel + 6));
@@ -159,15 +194,13 @@ mod tests {
 
     const SIZE: Size = Size::new(40, 20);
 
-    /// A candidate of columns 10..26 before an image that is bright in columns 14..22.
-    fn cut(nearer: Option<usize>) -> (Candidates, usize) {
-        let rgb =
-            Image::from_fn(
-                SIZE,
-                |x, _| {
-                    if (14..22).contains(&x) { [40, 200, 40] } else { [40, 40, 40] }
-                },
-            );
+    /// A candidate of columns 10..26 before an image that is bright in columns
+    /// 14..22, seen by a gray or a colour camera.
+    fn cut(nearer: Option<usize>, is_gray: bool) -> (Candidates, usize) {
+        let gray = Image::from_fn(SIZE, |x, _| if (14..22).contains(&x) { 200 } else { 40 });
+        let green = |x, y| if gray.get(x, y) > 40 { [40, 200, 40] } else { [40; 3] };
+        let rgb = if is_gray { Image::default() } else { Image::from_fn(SIZE, green) };
+        let left = View { rgb, gray, is_gray, gradient: Image::default() };
         let disparity = Image::from_fn(SIZE, |x, _| if Some(x) == nearer { 20.0 } else { 10.0 });
         let mut out = Candidates::default();
         out.clear(SIZE, 2);
@@ -175,24 +208,26 @@ mod tests {
             out.ids.row_mut(y)[10..26].fill(2);
             out.boxes[1].add(10, y, 0xffff);
         }
-        Trim { rgb: &rgb, disparity: &disparity, surface: 10.0 }.run(simd::detect(), 2, &mut out);
+        Trim { left: &left, disparity: &disparity, surface: 10.0 }.run(simd::detect(), 2, &mut out);
         let area = out.ids.pixels().iter().filter(|id| **id == 2).count();
         (out, area)
     }
 
     #[test]
     fn the_ends_move_to_the_edges_of_the_image() {
-        let (out, area) = cut(None);
-        let b = &out.boxes[1];
-        // An edge between two pixels is seen from both.
-        assert!((13..=14).contains(&b.x0) && (22..=23).contains(&b.x1), "{b:?}");
-        assert_eq!((b.y0, b.y1, b.area), (2, 18, area));
-        assert!((8 * 16..=10 * 16).contains(&area), "{area}");
+        for is_gray in [true, false] {
+            let (out, area) = cut(None, is_gray);
+            let b = &out.boxes[1];
+            // An edge between two pixels is seen from both.
+            assert!((13..=14).contains(&b.x0) && (22..=23).contains(&b.x1), "{b:?}");
+            assert_eq!((b.y0, b.y1, b.area), (2, 18, area));
+            assert!((8 * 16..=10 * 16).contains(&area), "{area}");
+        }
     }
 
     #[test]
     fn an_end_at_something_nearer_stays() {
-        let (out, _) = cut(Some(8));
+        let (out, _) = cut(Some(8), true);
         assert_eq!(out.boxes[1].x0, 10);
         assert!(out.boxes[1].x1 < 26);
     }

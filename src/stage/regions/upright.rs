@@ -114,7 +114,7 @@ impl Upright {
                 continue;
             }
             let surface = source.rig.depth_scale() as f32 / depth;
-            let trim = Trim { rgb: source.rgb, disparity: source.disparity, surface };
+            let trim = Trim { left: source.left, disparity: source.disparity, surface };
             trim.run(self.level, id, out);
         }
     }

@@ -1,5 +1,7 @@
 //! From one value per cell to one per pixel.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};
@@ -21,51 +23,65 @@ pub fn upsample(level: Level, cells: &Image<f32>, size: Size, out: &mut Image<f3
     }
     out.pixels_mut().par_chunks_exact_mut(size.width).with_min_len(32).enumerate().for_each(
         |(y, out)| {
-            let (upper, lower, share) = neighbours(y, cells.height());
-            let (upper, lower) = (cells.row(upper), cells.row(lower));
-            dispatch!(level, simd => Rows { upper, lower, share }.spread(simd, out));
+            dispatch!(level, simd => Rows::at(cells, y).spread(simd, 0..cells.width(), out));
         },
     );
 }
 
 /// The rows of cells above and below a row of pixels, and the share of the latter.
-struct Rows<'a> {
+pub(in crate::stage) struct Rows<'a> {
     upper: &'a [f32],
     lower: &'a [f32],
     share: f32,
 }
 
-impl Rows<'_> {
+impl<'a> Rows<'a> {
+    /// Those of row `y` of pixels.
     #[inline(always)]
-    fn spread<S: Simd>(&self, simd: S, out: &mut [f32]) {
+    pub(in crate::stage) fn at(cells: &'a Image<f32>, y: usize) -> Self {
+        let (upper, lower, share) = neighbours(y, cells.height());
+        Self { upper: cells.row(upper), lower: cells.row(lower), share }
+    }
+}
+
+impl Rows<'_> {
+    /// Writes the pixels of `cells`, and of others, into their row `out`.
+    #[inline(always)]
+    pub(in crate::stage) fn spread<S: Simd>(&self, simd: S, cells: Range<usize>, out: &mut [f32]) {
         let last = self.upper.len() - 1;
+        let end = cells.end.min(last);
         // Cells with neighbours on both sides; the last of them once more.
-        if let Some(end) = (last + 1).checked_sub(LANES + 1).filter(|end| *end > 0) {
-            for x in (1..end).step_by(LANES).chain([end]) {
-                self.spread_cells(simd, x, &mut out[x * CELL..(x + LANES) * CELL]);
+        if let Some(latest) = last.checked_sub(LANES).filter(|latest| *latest > 0) {
+            let mut x = cells.start.clamp(1, latest);
+            while x < end {
+                let from = x.min(latest);
+                self.spread_cells(simd, from, &mut out[from * CELL..(from + LANES) * CELL]);
+                x += LANES;
             }
         } else {
-            for x in 1..last {
+            for x in cells.start.max(1)..end {
                 self.spread_cell(x, &mut out[x * CELL..(x + 1) * CELL]);
             }
         }
         for x in [0, last] {
-            let end = out.len().min((x + 1) * CELL);
-            self.spread_cell(x, &mut out[x * CELL..end]);
+            if cells.contains(&x) {
+                let end = out.len().min((x + 1) * CELL);
+                self.spread_cell(x, &mut out[x * CELL..end]);
+            }
         }
     }
 
     /// The value between the rows at cell `x`.
     #[inline(always)]
-    fn at(&self, x: usize) -> f32 {
+    fn value(&self, x: usize) -> f32 {
         self.upper[x] + self.share * (self.lower[x] - self.upper[x])
     }
 
     #[inline(always)]
     fn spread_cell(&self, x: usize, out: &mut [f32]) {
-        let here = self.at(x);
-        let before = self.at(x.saturating_sub(1)) - here;
-        let after = self.at((x + 1).min(self.upper.len() - 1)) - here;
+        let here = self.value(x);
+        let before = self.value(x.saturating_sub(1)) - here;
+        let after = self.value((x + 1).min(self.upper.len() - 1)) - here;
         let pixels = [(before, OUTER), (before, INNER), (after, INNER), (after, OUTER)];
         for (out, (step, share)) in out.iter_mut().zip(pixels) {
             *out = here + share * step;

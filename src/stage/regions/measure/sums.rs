@@ -2,9 +2,11 @@
 
 use crate::image::Image;
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::stage::coarse::CELL;
 use crate::stage::depth::Depth;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::components::PixelBox;
+use crate::stage::saliency::upsample::Rows;
 
 /// Pixels that are added at once, whatever the level: the order of the
 /// additions, and so the last bit of a sum, is the same everywhere.
@@ -59,9 +61,17 @@ pub struct Sums {
     pub weighted: [f64; 3],
 }
 
+/// What is written beside the sums.
+pub struct Out<'a> {
+    /// The mask, of zeros.
+    pub mask: &'a mut [u8],
+    /// A buffer: one row of saliency.
+    pub row: &'a mut Vec<f32>,
+}
+
 impl Sums {
     /// Of the pixels in `bounds` whose id is `id`; their mask of `bounds` (255
-    /// inside, else 0) is written to `mask`, row by row.
+    /// inside, else 0) is written to the mask of `out`, row by row.
     pub fn of(
         level: Level,
         id: u32,
@@ -69,15 +79,15 @@ impl Sums {
         ids: &Image<u32>,
         source: &RegionSource<'_>,
         centre: &Centre,
-        mask: &mut [u8],
+        out: Out<'_>,
     ) -> Self {
         let mut sums = Self::default();
         for upper in (bounds.y0..bounds.y1).step_by(ROWS) {
             let rows = PixelBox { y0: upper, y1: (upper + ROWS).min(bounds.y1), ..*bounds };
             let at = (upper - bounds.y0) * bounds.width();
-            let mask = &mut mask[at..at + rows.height() * rows.width()];
+            let mask = &mut out.mask[at..at + rows.height() * rows.width()];
             dispatch!(level, simd => {
-                sums.add_saliency(simd, id, &rows, ids, source.saliency);
+                sums.add_saliency(simd, id, &rows, ids, source.attention, out.row);
                 sums.add_confidence(simd, id, &rows, ids, source);
                 sums.add(simd, id, &rows, ids, source, centre, mask);
             });
@@ -85,8 +95,8 @@ impl Sums {
         sums
     }
 
-    /// By itself: the map was written long ago, and of a short loop many pixels
-    /// are fetched at once.
+    /// Adds up what [`upsample`](crate::stage::saliency::upsample) makes of the attention per
+    /// cell: those are few and at hand, the pixels were written long ago.
     #[inline(always)]
     fn add_saliency<S: Simd>(
         &mut self,
@@ -94,16 +104,20 @@ impl Sums {
         id: u32,
         rows: &PixelBox,
         ids: &Image<u32>,
-        map: &Image<f32>,
+        attention: &Image<f32>,
+        row: &mut Vec<f32>,
     ) {
         let zero = f32x16::splat(simd, 0.0);
         let own = u32x16::splat(simd, id);
         let [mut sum, mut most] = [zero; 2];
+        let cells = rows.x0 / CELL..rows.x1.div_ceil(CELL);
+        row.resize(attention.width() * CELL, 0.0);
         for y in rows.y0..rows.y1 {
-            let (ids, map) = (ids.row(y), map.row(y));
+            let ids = ids.row(y);
+            Rows::at(attention, y).spread(simd, cells.clone(), row);
             for x in (rows.x0..rows.x1).step_by(LANES) {
                 let inside = u32x16::from_slice(simd, &load(ids, x)).simd_eq(own);
-                let s = inside.select(f32x16::from_slice(simd, &load(map, x)), zero);
+                let s = inside.select(f32x16::from_slice(simd, &load(row, x)), zero);
                 sum += s;
                 most = most.max(s);
             }
