@@ -91,8 +91,8 @@ impl Measure {
         };
         region.mask.clear();
         region.mask.resize(bounds.width() * bounds.height(), 0);
-        let out = Out { mask: &mut region.mask, row: &mut self.row };
-        let sums = Sums::of(self.level, id, bounds, ids, source, &centre, out);
+        let mut out = Out { mask: &mut region.mask, row: &mut self.row };
+        let sums = Sums::of(self.level, id, bounds, ids, source, &centre, &mut out);
 
         region.area = sums.area as u32;
         region.mean_saliency = (sums.saliency / sums.area) as f32;

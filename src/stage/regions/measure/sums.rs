@@ -79,7 +79,7 @@ impl Sums {
         ids: &Image<u32>,
         source: &RegionSource<'_>,
         centre: &Centre,
-        out: Out<'_>,
+        out: &mut Out<'_>,
     ) -> Self {
         let mut sums = Self::default();
         for upper in (bounds.y0..bounds.y1).step_by(ROWS) {
