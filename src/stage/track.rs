@@ -1,5 +1,6 @@
 //! Identity of regions over frames.
 
+pub mod common;
 pub mod follow;
 pub mod kalman;
 
@@ -8,16 +9,23 @@ use crate::config::Config;
 use crate::image::Image;
 use crate::perception::{Region, RegionList, Rejections, TrackState};
 use crate::stamp::Stamp;
-use follow::{Box2, Follow};
+use common::CommonMotion;
+use follow::{Box2, Follow, Life};
 
+/// An active track is remembered for so many times `tracking.max_age`.
+const REMEMBERED: f64 = 3.0;
+/// What the score of one that was given up is multiplied by: tracks that are
+/// followed come first.
+const LOST: f32 = 0.5;
 /// Squared Mahalanobis distance beyond which two positions are not the same
 /// point: 99.9 % of the chi-squared distribution with 3 degrees of freedom.
 const GATE: f64 = 16.27;
 /// Where boxes overlap too little, positions may continue a track up to this
-/// many times the larger lateral extent of the object.
+/// many times the largest lateral extent of track and region.
 const REACH: f64 = 1.0;
-/// Largest ratio of the boxes' areas in that case.
-const MAX_GROWTH: f32 = 2.0;
+/// Largest ratio of the boxes' widths and heights in that case: of what stands, more
+/// or less of the height is seen.
+const MAX_GROWTH: [f32; 2] = [2.0, 3.0];
 /// A longer time between two frames in seconds is another recording.
 const LONGEST_GAP: f64 = 5.0;
 
@@ -27,7 +35,7 @@ const SAME_PART: f32 = 0.1;
 const SAME_PX: f32 = 1.0;
 /// Share of a prediction's pixels that must speak for it: an outline of which less
 /// is left is not that of the thing any more.
-const LEAST_FOR: f32 = 0.8;
+const LEAST_FOR: f32 = 0.82;
 
 /// A track and a region that may be the same thing.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +59,7 @@ pub struct Track {
     pairs: Vec<Pair>,
     taken: Vec<bool>,
     order: Vec<(u32, u32)>,
+    common: CommonMotion,
 }
 
 impl Track {
@@ -68,6 +77,7 @@ impl Track {
             pairs: Vec::new(),
             taken: Vec::new(),
             order: Vec::new(),
+            common: CommonMotion::default(),
         }
     }
 
@@ -83,7 +93,7 @@ impl Track {
         if !same_size {
             self.last = None;
             for track in &mut self.tracks {
-                track.alive = false;
+                track.life = Life::Over;
             }
         }
     }
@@ -93,7 +103,7 @@ impl Track {
         self.last = None;
         self.next_id = 1;
         for track in &mut self.tracks {
-            track.alive = false;
+            track.life = Life::Over;
         }
     }
 
@@ -102,12 +112,16 @@ impl Track {
     /// A new track is NEW until it was seen in `tracking.confirm` of the last
     /// three frames, then ACTIVE. An active track that is not seen is appended,
     /// oldest first, as COASTED for up to `tracking.max_age` seconds (at most
-    /// 0.6 of the time for which it was seen), at its predicted place: it takes the next free label, which no pixel of the
-    /// label image has; its disparity and depth are NaN (not measured) and its
-    /// confidence falls to one half over that time. A track that ends without
-    /// ever having been active is counted as `unstable`.
+    /// 0.6 of the time for which it was seen), at its predicted place: it takes the
+    /// next free label, which no pixel of the label image has; its disparity and depth
+    /// are NaN (not measured) and its confidence falls to one half over that time.
     ///
-    /// It is published only where the thing probably still is: at least four fifths
+    /// Then the track is given up; what was never active is so after two frames and is
+    /// counted as `unstable`. An active one is remembered for three times
+    /// `tracking.max_age`, another one once: a region of its size where it is
+    /// predicted, which continues no other track better, takes its id back.
+    ///
+    /// A coasted region is published only where the thing probably still is: at least 82 %
     /// of its predicted pixels must show in `disparity` (pixels, NaN where there is
     /// none) its own distance, outside of the regions of this frame in `labels`,
     /// or something nearer that hides it. What lies behind it, a region at the same
@@ -131,11 +145,12 @@ impl Track {
             self.reset();
         }
         self.last = Some(stamp);
-        for track in self.tracks.iter_mut().filter(|t| t.alive) {
+        for track in self.tracks.iter_mut().filter(|t| t.is_alive()) {
             track.predict(dt);
         }
         self.associate(stamp, regions);
-        self.begin(stamp, regions);
+        self.common.find(&self.tracks);
+        self.begin(stamp, rig, regions);
         self.end(stamp, rejections);
         for region in regions.iter_mut() {
             self.describe(stamp, region);
@@ -146,7 +161,7 @@ impl Track {
     /// Continues tracks with regions, the best pairs first.
     fn associate(&mut self, stamp: Stamp, regions: &mut RegionList) {
         self.pairs.clear();
-        for (i, track) in self.tracks.iter().enumerate().filter(|(_, t)| t.alive) {
+        for (i, track) in self.tracks.iter().enumerate().filter(|(_, t)| t.is_alive()) {
             for (j, region) in regions.iter().enumerate() {
                 if let Some(score) = affinity(track, region, self.min_iou) {
                     self.pairs.push(Pair { score, track: i as u32, region: j as u32 });
@@ -171,33 +186,39 @@ impl Track {
     }
 
     /// Starts tracks for the regions that continue none.
-    fn begin(&mut self, stamp: Stamp, regions: &mut RegionList) {
+    fn begin(&mut self, stamp: Stamp, rig: &StereoRig, regions: &mut RegionList) {
         let mut slot = 0;
         for (region, _) in regions.iter_mut().zip(&self.taken).filter(|(_, taken)| !**taken) {
-            while self.tracks.get(slot).is_some_and(|t| t.alive) {
+            while self.tracks.get(slot).is_some_and(Follow::is_alive) {
                 slot += 1;
             }
             if slot == self.tracks.len() {
                 self.tracks.push(Follow::default());
             }
             region.track_id = self.next_id;
-            self.tracks[slot].start(self.next_id, stamp, region);
+            self.tracks[slot].start(self.next_id, stamp, region, self.common.velocity, rig);
             self.next_id = self.next_id.checked_add(1).unwrap_or(1);
         }
     }
 
-    /// Ends tracks that were not seen for too long.
+    /// Gives up tracks that were not seen for too long, and in the end forgets them.
     fn end(&mut self, stamp: Stamp, rejections: &mut Rejections) {
-        for track in self.tracks.iter_mut().filter(|t| t.alive && !t.seen) {
-            if track.is_hopeless() || track.unseen_for(stamp) > self.max_age {
-                track.alive = false;
+        for track in self.tracks.iter_mut().filter(|t| t.is_alive() && !t.seen) {
+            let unseen = track.unseen_for(stamp);
+            if track.life == Life::Followed && (track.is_hopeless() || unseen > self.max_age) {
+                track.life = Life::Lost;
                 rejections.unstable += u32::from(!track.active);
+            }
+            let remembered = if track.active { REMEMBERED } else { 1.0 };
+            if unseen > remembered * self.max_age {
+                track.life = Life::Over;
             }
         }
     }
 
     fn describe(&self, stamp: Stamp, region: &mut Region) {
-        let Some(track) = self.tracks.iter().find(|t| t.alive && t.id == region.track_id) else {
+        let Some(track) = self.tracks.iter().find(|t| t.is_alive() && t.id == region.track_id)
+        else {
             return;
         };
         // With `confirm` 1 the first frame is still the first one.
@@ -211,7 +232,8 @@ impl Track {
     fn coast(&mut self, stamp: Stamp, rig: &StereoRig, views: Views<'_>, regions: &mut RegionList) {
         self.order.clear();
         for (i, track) in self.tracks.iter().enumerate() {
-            if track.alive && !track.seen && track.active && track.is_predictable(stamp) {
+            let coasts = track.life == Life::Followed && !track.seen && track.active;
+            if coasts && track.is_predictable(stamp) {
                 self.order.push((track.id, i as u32));
             }
         }
@@ -225,7 +247,7 @@ impl Track {
             let region = regions.push_empty();
             if !track.coast(rig.left.size, region) {
                 // It has left the image.
-                track.alive = false;
+                track.life = Life::Over;
                 regions.truncate(regions.len() - 1);
                 continue;
             }
@@ -285,7 +307,8 @@ impl Views<'_> {
 /// Boxes that overlap by `min_iou` score `1 + IoU`, lowered by the distance in
 /// space; of boxes one of which lies in the other, as when a thing is seen in part or
 /// together with another one for a frame, half as much. Boxes that do neither score
-/// by that distance alone, if it is small against the object itself.
+/// by that distance alone, if it is small against the object itself. A track that
+/// was given up is continued only by what has its size.
 fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     let bounds = Box2::of(region);
     let iou = track.bounds.iou(&bounds);
@@ -293,18 +316,23 @@ fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     if distance.is_some_and(|d| d > GATE) {
         return None;
     }
+    let same_size = track.bounds.growth(&bounds).iter().zip(MAX_GROWTH).all(|(g, most)| *g <= most);
+    let lost = track.life == Life::Lost;
+    if lost && !same_size {
+        return None;
+    }
+    let nearness = 1.0 / (1.0 + distance.unwrap_or(0.0) / GATE) as f32;
+    let nearness = if lost { LOST * nearness } else { nearness };
     if iou >= min_iou && iou > 0.0 {
-        return Some((1.0 + iou) / (1.0 + distance.unwrap_or(0.0) / GATE) as f32);
+        return Some((1.0 + iou) * nearness);
     }
-    let (kalman, distance) = (track.kalman.as_ref()?, distance?);
+    let estimate = track.kalman.as_ref()?.position();
+    distance?;
     if track.bounds.is_part(&bounds) {
-        return Some(0.5 * (1.0 + iou) / (1.0 + distance / GATE) as f32);
+        return Some(0.5 * (1.0 + iou) * nearness);
     }
-    let estimate = kalman.position();
     let metres = (0..3).map(|i| (estimate[i] - region.position[i]).powi(2)).sum::<f64>().sqrt();
-    let lateral = region.extent[0].max(region.extent[1]);
-    let areas = (track.bounds.width * track.bounds.height, bounds.width * bounds.height);
-    let growth = (areas.0 / areas.1).max(areas.1 / areas.0);
-    (metres <= REACH * lateral && growth <= MAX_GROWTH)
-        .then_some(0.5 / (1.0 + distance / GATE) as f32)
+    let [width, height, _] = region.extent;
+    let lateral = width.max(height).max(track.last.extent[0]).max(track.last.extent[1]);
+    (metres <= REACH * lateral && same_size).then_some(0.5 * nearness)
 }

@@ -148,7 +148,91 @@ fn a_flicker_is_counted_as_unstable() {
     driver.frame(0.2, &[]);
     assert_eq!(driver.rejections.unstable, 1);
     let again = driver.frame(0.3, &[person(0.0, 8.0)]);
-    assert_eq!(again[0].track_id, 2, "an id is never used again");
+    assert_eq!((again[0].track_id, again[0].track_state), (1, TrackState::New));
+    for frame in 4..10 {
+        driver.frame(f64::from(frame) * 0.1, &[]);
+    }
+    assert_eq!(driver.frame(1.0, &[person(0.0, 8.0)])[0].track_id, 2, "forgotten");
+}
+
+#[test]
+fn what_was_seen_once_is_expected_to_do_what_most_things_do() {
+    // The camera drives at 8 m/s past people who stand there; a bollard beside the
+    // road is seen, not seen, and seen again where it went through the image, and
+    // so is another one that nobody has seen before.
+    let mut driver = Driver::new(&Config::default());
+    let bollard = |x: f64, z: f64| Thing { at: [x, 1.2, z], size: [0.2, 0.6] };
+    let mut ids = Vec::new();
+    for frame in 0..10 {
+        let t = f64::from(frame) * 0.1;
+        let at = |z: f64| z - 8.0 * t;
+        let mut things = vec![person(-3.0, at(22.0)), person(2.0, at(26.0)), person(4.0, at(30.0))];
+        match frame {
+            7 => things.push(bollard(-2.5, at(14.0))),
+            9 => things.extend([bollard(-2.5, at(14.0)), bollard(2.5, at(14.0))]),
+            _ => {}
+        }
+        let list = driver.frame(t, &things);
+        ids = list.iter().map(|r| r.track_id).collect();
+    }
+    assert_eq!(ids, [1, 2, 3, 4, 5]);
+}
+
+#[test]
+fn an_id_comes_back_to_what_is_the_same_thing_only() {
+    let car = Thing { at: [0.0, 0.4, 8.0], size: [3.8, 1.5] };
+    for (frames, thing, same) in [
+        (12, person(0.0, 8.0), true),
+        (12, person(3.5, 8.0), false),
+        (12, person(0.0, 14.0), false),
+        (12, car, false),
+        (17, person(0.0, 8.0), false),
+    ] {
+        let mut driver = Driver::new(&Config::default());
+        for frame in 0..10 {
+            driver.frame(f64::from(frame) * 0.1, &[person(0.0, 8.0)]);
+        }
+        let back = 9 + frames;
+        for frame in 10..back {
+            let list = driver.frame(f64::from(frame) * 0.1, &[]);
+            assert_eq!(list.len(), usize::from(frame <= 14), "frame {frame}");
+        }
+        let list = driver.frame(f64::from(back) * 0.1, &[thing]);
+        assert_eq!(list[0].track_id == 1, same, "{frames} frames, {:?}", thing.at);
+        // It is active at once, but predictions have to be earned anew.
+        let state = if same { TrackState::Active } else { TrackState::New };
+        assert_eq!(list[0].track_state, state);
+        assert!(driver.frame(f64::from(back + 1) * 0.1, &[]).is_empty());
+    }
+}
+
+#[test]
+fn a_track_that_is_followed_comes_before_one_that_was_given_up() {
+    let mut driver = Driver::new(&Config::default());
+    // One walks towards the place where another one was seen last, and is there
+    // with a leap.
+    let (walker, other) = (|t: f64| person(-2.0 + 1.6 * t, 8.0), person(0.15, 8.0));
+    for frame in 0..12 {
+        let t = f64::from(frame) * 0.1;
+        let both = [walker(t), other];
+        driver.frame(t, &both[..if frame < 4 { 2 } else { 1 }]);
+    }
+    assert_eq!(driver.frame(1.2, &[other])[0].track_id, 1);
+}
+
+#[test]
+fn of_what_stands_more_or_less_may_be_seen() {
+    // The top of a post, and the whole of it as far to the left as it is wide;
+    // a wall is no post.
+    for (x, size, same) in [(-0.3, [0.3, 2.6], true), (-1.0, [1.4, 1.0], false)] {
+        let mut driver = Driver::new(&Config::default());
+        for frame in 0..3 {
+            let t = f64::from(frame) * 0.1;
+            driver.frame(t, &[Thing { at: [0.0, -0.5, 8.0], size: [0.3, 1.0] }]);
+        }
+        let list = driver.frame(0.3, &[Thing { at: [x, 0.3, 8.0], size }]);
+        assert_eq!(list[0].track_id == 1, same, "{size:?}");
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! One track: a region followed over frames.
 
 use super::kalman::Kalman;
+use crate::camera::StereoRig;
 use crate::image::Size;
 use crate::perception::Region;
 use crate::stamp::Stamp;
@@ -36,6 +37,12 @@ impl Box2 {
         if either > 0.0 { both / either } else { 0.0 }
     }
 
+    /// Ratio of the widths and of the heights, the larger one over the smaller one.
+    pub fn growth(&self, other: &Self) -> [f32; 2] {
+        let ratio = |a: f32, b: f32| (a / b).max(b / a);
+        [ratio(self.width, other.width), ratio(self.height, other.height)]
+    }
+
     /// True when most of one of them lies in the other, larger one: a thing seen in
     /// part, or together with something else.
     pub fn is_part(&self, other: &Self) -> bool {
@@ -64,6 +71,8 @@ const SAME: f32 = 0.5;
 /// Standard deviation of the centroid of one and the same object from frame to
 /// frame, in parts of its extent: a region never covers exactly the same pixels.
 const SEGMENTATION: f64 = 0.25;
+/// Depth in metres below which the view of a point tells nothing.
+const NEAREST: f64 = 0.1;
 /// Longest time for which a track is predicted, in parts of the time it was seen.
 const SEEN_PART: f64 = 0.6;
 
@@ -77,11 +86,35 @@ fn noise(region: &Region) -> [f64; 9] {
     noise
 }
 
+/// Pixels per second at which a point (metres) that moves at `velocity` (m/s) goes
+/// through the image; 0 when it is not before the camera.
+fn image_velocity(point: &[f64; 3], velocity: &[f64; 3], rig: &StereoRig) -> [f32; 2] {
+    let [x, y, z] = *point;
+    if z.is_nan() || z < NEAREST {
+        return [0.0; 2];
+    }
+    // u = f X/Z, so that u' = f (X' Z - X Z') / Z².
+    let along = |f: f64, p: f64, v: f64| (f * (v - p * velocity[2] / z) / z) as f32;
+    [along(rig.focal_px(), x, velocity[0]), along(rig.focal_y_px(), y, velocity[1])]
+}
+
+/// Where a track stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Life {
+    /// Forgotten: the slot is free.
+    #[default]
+    Over,
+    /// Seen lately.
+    Followed,
+    /// Not seen for so long that it is remembered only.
+    Lost,
+}
+
 /// A track. Ended tracks keep their buffers for the next ones.
 #[derive(Debug, Default)]
 pub struct Follow {
-    /// False when the slot is free.
-    pub alive: bool,
+    /// Whether the slot is taken, and the track still followed.
+    pub life: Life,
     /// Identity, from 1.
     pub id: u32,
     /// Seen often enough to be believed.
@@ -95,29 +128,48 @@ pub struct Follow {
     /// The region as last seen.
     pub last: Region,
     born: Stamp,
+    /// Since when it was not given up.
+    since: Stamp,
     last_seen: Stamp,
     /// Bit 0: seen in this frame, bit 1: in the one before, …
     history: u8,
     sightings: u32,
-    /// Pixels per second of the box's centre.
+    /// Pixels per second of the box's centre; what is expected until it was seen twice.
     drift: [f32; 2],
+    /// Velocity to expect when it began, m/s.
+    expected: Option<[f64; 3]>,
 }
 
 impl Follow {
-    /// Starts a track with its first region in a free slot.
-    pub fn start(&mut self, id: u32, stamp: Stamp, region: &Region) {
-        self.alive = true;
+    /// False when it is forgotten.
+    pub fn is_alive(&self) -> bool {
+        self.life != Life::Over
+    }
+
+    /// Starts a track with its first region in a free slot; `expected` is the
+    /// velocity (m/s) that things have in common, if that is known.
+    pub fn start(
+        &mut self,
+        id: u32,
+        stamp: Stamp,
+        region: &Region,
+        expected: Option<[f64; 3]>,
+        rig: &StereoRig,
+    ) {
+        self.life = Life::Followed;
         self.id = id;
         self.active = false;
         self.seen = true;
         self.bounds = Box2::of(region);
-        self.kalman = Kalman::new(&region.position, &noise(region));
+        self.expected = expected;
+        self.kalman = Kalman::new(&region.position, &noise(region), expected.as_ref());
         self.last.clone_from(region);
         self.born = stamp;
+        self.since = stamp;
         self.last_seen = stamp;
         self.history = 1;
         self.sightings = 1;
-        self.drift = [0.0; 2];
+        self.drift = expected.map_or([0.0; 2], |v| image_velocity(&region.position, &v, rig));
     }
 
     /// Moves box and position `dt` seconds ahead; not seen until `observe`.
@@ -141,19 +193,25 @@ impl Follow {
             // The error of the predicted centre came about since the last
             // sighting; half of it is taken for the box's own jitter, except
             // when there is no estimate yet.
-            let gain = if self.sightings == 1 { 1.0 } else { 0.5 } / elapsed;
+            let unknown = self.sightings == 1 && self.drift == [0.0; 2];
+            let gain = if unknown { 1.0 } else { 0.5 } / elapsed;
             let (seen, predicted) = (seen.centre(), self.bounds.centre());
             self.drift[0] += gain * (seen[0] - predicted[0]);
             self.drift[1] += gain * (seen[1] - predicted[1]);
+        }
+        if self.life == Life::Lost {
+            self.life = Life::Followed;
+            self.since = stamp;
         }
         self.seen = true;
         self.history |= 1;
         self.sightings += 1;
         self.last_seen = stamp;
         self.bounds = seen;
+        let noise = noise(region);
         match &mut self.kalman {
-            Some(kalman) => kalman.update(&region.position, &noise(region)),
-            None => self.kalman = Kalman::new(&region.position, &noise(region)),
+            Some(kalman) => kalman.update(&region.position, &noise),
+            None => self.kalman = Kalman::new(&region.position, &noise, self.expected.as_ref()),
         }
         self.active |= (self.history & 0b111).count_ones() >= confirm;
         self.last.clone_from(region);
@@ -176,9 +234,9 @@ impl Follow {
     }
 
     /// True while its prediction is worth publishing: the longer a track was
-    /// seen, the longer it coasts.
+    /// seen without being given up, the longer it coasts.
     pub fn is_predictable(&self, stamp: Stamp) -> bool {
-        self.unseen_for(stamp) <= SEEN_PART * self.last_seen.seconds_since(self.born)
+        self.unseen_for(stamp) <= SEEN_PART * self.last_seen.seconds_since(self.since)
     }
 
     /// True for a track that was never believed and can no longer become so

@@ -4,8 +4,10 @@ use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 
 /// Standard deviation of the acceleration that the model leaves out, m/s².
 const ACCELERATION: f64 = 3.0;
-/// Standard deviation of the velocity of what was seen once, m/s per axis.
+/// Standard deviation of the velocity of what was seen once, m/s per axis: where
+/// nothing is known, and around what most things do.
 const FIRST_VELOCITY: f64 = 10.0;
+const OWN_VELOCITY: f64 = 3.0;
 /// Added to every measured variance, m²: a tracked point is not a rigid one.
 const FLOOR: f64 = 1e-6;
 
@@ -18,14 +20,23 @@ pub struct Kalman {
 }
 
 impl Kalman {
-    /// The filter after a first position; `None` when that is no measurement.
-    pub fn new(position: &[f64; 3], covariance: &[f64; 9]) -> Option<Self> {
+    /// The filter after a first position, of a point of which the `expected` velocity
+    /// (m/s) is known or nothing; `None` when the position is no measurement.
+    pub fn new(
+        position: &[f64; 3],
+        covariance: &[f64; 9],
+        expected: Option<&[f64; 3]>,
+    ) -> Option<Self> {
         let (position, noise) = measurement(position, covariance)?;
         let mut state = Vector6::zeros();
         state.fixed_rows_mut::<3>(0).copy_from(&position);
         let mut p = Matrix6::zeros();
         p.fixed_view_mut::<3, 3>(0, 0).copy_from(&noise);
-        p.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(FIRST_VELOCITY * FIRST_VELOCITY);
+        let deviation = if expected.is_some() { OWN_VELOCITY } else { FIRST_VELOCITY };
+        p.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(deviation * deviation);
+        if let Some(velocity) = expected {
+            state.fixed_rows_mut::<3>(3).copy_from_slice(velocity);
+        }
         Some(Self { state, covariance: p })
     }
 
@@ -76,6 +87,11 @@ impl Kalman {
     /// Covariance of the estimated position, row-major, m².
     pub fn position_covariance(&self) -> [f64; 9] {
         std::array::from_fn(|i| self.covariance[(i / 3, i % 3)])
+    }
+
+    /// Variance of the estimated velocity along the axis it is known least, m²/s².
+    pub fn velocity_variance(&self) -> f64 {
+        (3..6).map(|i| self.covariance[(i, i)]).fold(0.0, f64::max)
     }
 
     /// Estimated velocity, m/s.
