@@ -14,7 +14,7 @@ mod backdrop;
 mod finish;
 mod grid;
 mod material;
-mod noise;
+pub mod noise;
 mod part;
 mod renderer;
 mod sensor;

@@ -207,27 +207,12 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::image::Size;
-
-    /// Smooth noise that repeats nowhere.
-    fn noise(u: f64, v: f64) -> f64 {
-        let at = |x: f64, y: f64| {
-            let mut h = (x as i64 as u32).wrapping_mul(0x9E37_79B1) ^ (y as i64 as u32);
-            h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-            h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
-            f64::from(h >> 8) / f64::from(1 << 24)
-        };
-        let (x, y) = (u.floor(), v.floor());
-        let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
-        let (s, t) = (smooth(u - x), smooth(v - y));
-        let upper = at(x, y) * (1.0 - s) + at(x + 1.0, y) * s;
-        let lower = at(x, y + 1.0) * (1.0 - s) + at(x + 1.0, y + 1.0) * s;
-        upper * (1.0 - t) + lower * t
-    }
+    use crate::input::synthetic::noise::noise2;
 
     fn view(size: Size, place: impl Fn(f64, f64) -> [f64; 2], gain: f64) -> Image<u8> {
         Image::from_fn(size, |x, y| {
             let [u, v] = place(x as f64, y as f64);
-            (gain * (30.0 + 200.0 * noise(u / 5.0, v / 5.0))) as u8
+            (gain * (130.0 + 100.0 * noise2(1, u / 5.0, v / 5.0))) as u8
         })
     }
 

@@ -10,6 +10,7 @@ use salient_stereo::command::doctor::{Finding, Severity, examine_bag};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
 use salient_stereo::input::bag::BagOptions;
+use salient_stereo::input::synthetic::noise::noise2;
 use salient_stereo::output::bag::{BagWriter, Packing};
 use salient_stereo::ros::convert;
 use salient_stereo::ros::message::sensor_msgs::{self, CameraInfo};
@@ -33,22 +34,6 @@ impl Sent {
     }
 }
 
-/// Smooth noise that repeats nowhere.
-fn noise(u: f64, v: f64) -> f64 {
-    let at = |x: f64, y: f64| {
-        let mut h = (x as i64 as u32).wrapping_mul(0x9E37_79B1) ^ (y as i64 as u32);
-        h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
-        h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
-        f64::from(h >> 8) / f64::from(1 << 24)
-    };
-    let (x, y) = (u.floor(), v.floor());
-    let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
-    let (s, t) = (smooth(u - x), smooth(v - y));
-    let upper = at(x, y) * (1.0 - s) + at(x + 1.0, y) * s;
-    let lower = at(x, y + 1.0) * (1.0 - s) + at(x + 1.0, y + 1.0) * s;
-    upper * (1.0 - t) + lower * t
-}
-
 /// A wall of noise, seen by the right camera `shift` pixels farther left and
 /// `lower` pixels lower.
 pub fn sent(number: usize, shift: f64, lower: f64) -> Sent {
@@ -59,7 +44,7 @@ pub fn sent(number: usize, shift: f64, lower: f64) -> Sent {
     let view = |shift: f64, lower: f64| {
         let image = Image::from_fn(SIZE, |x, y| {
             let (u, v) = (x as f64 + shift, y as f64 - lower);
-            [(30.0 + 200.0 * noise(u / 5.0, v / 5.0)) as u8; 3]
+            [(130.0 + 100.0 * noise2(1, u / 5.0, v / 5.0)) as u8; 3]
         });
         convert::rgb_image(&image, header.clone())
     };
