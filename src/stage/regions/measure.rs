@@ -19,6 +19,12 @@ const SYSTEMATIC_PX: f64 = 0.15;
 const BOUNDARY_PX: f64 = 0.5;
 /// Neighbouring pixels share their matching window: this many count as one.
 const PIXELS_PER_SAMPLE: f64 = 25.0;
+/// Of a thing of n times as many pixels one in n rows is looked at for its
+/// disparities, which are smooth over a matching window: but one in four at least,
+/// and no fewer rows than these.
+const MOST_PIXELS: usize = 4096;
+const MOST_EVERY: usize = 4;
+const LEAST_ROWS: usize = 8;
 /// Values of which percentiles are taken, about.
 const MOST_VALUES: usize = 1024;
 /// Columns by which the sample of a row lies beside that of the row above: a
@@ -72,7 +78,9 @@ impl Measure {
         (region.x, region.y) = (bounds.x0 as u32, bounds.y0 as u32);
         (region.width, region.height) = (bounds.width() as u32, bounds.height() as u32);
 
-        self.collect(id, bounds, ids, source);
+        let every =
+            (bounds.area / MOST_PIXELS).min(MOST_EVERY).min(bounds.height() / LEAST_ROWS).max(1);
+        self.collect(id, bounds, ids, source, every);
         let [far, low, middle, high, near] =
             percentiles(&mut self.sample, [0.05, 0.16, 0.5, 0.84, 0.95]);
         let spread = (high - low) / 2.0;
@@ -87,9 +95,9 @@ impl Measure {
             u: (bounds.x0 + bounds.x1) as f32 / 2.0,
             v: (bounds.y0 + bounds.y1) as f32 / 2.0,
             tolerance: (INLIER_SIGMAS * spread).max(1.0),
+            every,
             limits: self.depth,
         };
-        region.mask.clear();
         region.mask.resize(bounds.width() * bounds.height(), 0);
         let mut out = Out { mask: &mut region.mask, row: &mut self.row };
         let sums = Sums::of(self.level, id, bounds, ids, source, &centre, &mut out);
@@ -97,7 +105,7 @@ impl Measure {
         region.area = sums.area as u32;
         region.mean_saliency = (sums.saliency / sums.area) as f32;
         region.max_saliency = sums.max_saliency;
-        region.valid_fraction = (sums.valid / sums.area) as f32;
+        region.valid_fraction = (sums.valid / sums.looked) as f32;
         // Without a single valid pixel the means are 0/0 = NaN, as they should be.
         let (mean, deviation) = mean_and_deviation(sums.disparity, sums.valid);
         region.mean_disparity = (f64::from(centre.disparity) + mean) as f32;
@@ -118,13 +126,20 @@ impl Measure {
     }
 
     /// Disparities of pixels with finite depth: of all, or in large regions of
-    /// every n-th in a row, another one in each row.
-    fn collect(&mut self, id: u32, bounds: &PixelBox, ids: &Image<u32>, source: &RegionSource<'_>) {
-        let step = bounds.area.div_ceil(MOST_VALUES).max(1);
-        self.sample.resize(bounds.height() * bounds.width().div_ceil(step), 0.0);
+    /// every n-th in a row, another one in each of the rows that are looked at.
+    fn collect(
+        &mut self,
+        id: u32,
+        bounds: &PixelBox,
+        ids: &Image<u32>,
+        source: &RegionSource<'_>,
+        every: usize,
+    ) {
+        let step = (bounds.area / every).div_ceil(MOST_VALUES).max(1);
+        self.sample.resize(bounds.height().div_ceil(every) * bounds.width().div_ceil(step), 0.0);
         let scale = source.rig.depth_scale() as f32;
         let mut n = 0;
-        for y in bounds.y0..bounds.y1 {
+        for y in (bounds.y0..bounds.y1).step_by(every) {
             let (d, ids) = (source.disparity.row(y), ids.row(y));
             let from = bounds.x0 + y * SHIFT % step;
             for x in (from..bounds.x1).step_by(step) {
@@ -155,7 +170,8 @@ fn locate(bounds: &PixelBox, centre: &Centre, sums: &Sums, rig: &StereoRig, regi
         return;
     }
     let lens = Lens::new(rig);
-    let samples = (n / PIXELS_PER_SAMPLE).max(1.0);
+    // Rows that were not looked at shared the windows of those that were.
+    let samples = (n * centre.every as f64 / PIXELS_PER_SAMPLE).max(1.0);
     let systematic = [BOUNDARY_PX, BOUNDARY_PX, SYSTEMATIC_PX];
     let variance: [f64; 3] = std::array::from_fn(|i| {
         let (_, deviation) = mean_and_deviation(sums.place[i], n);

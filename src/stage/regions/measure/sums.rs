@@ -32,6 +32,8 @@ pub struct Centre {
     pub v: f32,
     /// Largest difference from `disparity` of a pixel that counts for the position.
     pub tolerance: f32,
+    /// Of all measures of disparity one in so many rows is looked at.
+    pub every: usize,
     /// What depths are finite.
     pub limits: Depth,
 }
@@ -39,9 +41,10 @@ pub struct Centre {
 /// Sums over the pixels of a region; d, z, u and v are differences from the [`Centre`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sums {
-    /// Number of pixels, of those with disparity, with finite depth, and of
-    /// those that count for the position.
+    /// Number of pixels; of those in the rows that were looked at, and of them of
+    /// those with disparity, with finite depth, and of those that count for the position.
     pub area: f64,
+    pub looked: f64,
     pub valid: f64,
     pub finite: f64,
     pub inliers: f64,
@@ -63,7 +66,7 @@ pub struct Sums {
 
 /// What is written beside the sums.
 pub struct Out<'a> {
-    /// The mask, of zeros.
+    /// The mask.
     pub mask: &'a mut [u8],
     /// A buffer: one row of saliency.
     pub row: &'a mut Vec<f32>,
@@ -87,41 +90,56 @@ impl Sums {
             let at = (upper - bounds.y0) * bounds.width();
             let mask = &mut out.mask[at..at + rows.height() * rows.width()];
             dispatch!(level, simd => {
-                sums.add_saliency(simd, id, &rows, ids, source.attention, out.row);
+                sums.add_mask(simd, id, &rows, ids, source.attention, (mask, out.row));
                 sums.add_confidence(simd, id, &rows, ids, source);
-                sums.add(simd, id, &rows, ids, source, centre, mask);
+                sums.add(simd, id, &rows, ids, source, centre);
             });
         }
         sums
     }
 
-    /// Adds up what [`upsample`](crate::stage::saliency::upsample) makes of the attention per
-    /// cell: those are few and at hand, the pixels were written long ago.
+    /// Writes the mask and adds up what [`upsample`](crate::stage::saliency::upsample) makes
+    /// of the attention per cell: those are few and at hand, the pixels were
+    /// written long ago.
     #[inline(always)]
-    fn add_saliency<S: Simd>(
+    fn add_mask<S: Simd>(
         &mut self,
         simd: S,
         id: u32,
         rows: &PixelBox,
         ids: &Image<u32>,
         attention: &Image<f32>,
-        row: &mut Vec<f32>,
+        (mask, row): (&mut [u8], &mut Vec<f32>),
     ) {
         let zero = f32x16::splat(simd, 0.0);
         let own = u32x16::splat(simd, id);
         let [mut sum, mut most] = [zero; 2];
+        let mut area = 0;
         let cells = rows.x0 / CELL..rows.x1.div_ceil(CELL);
         row.resize(attention.width() * CELL, 0.0);
-        for y in rows.y0..rows.y1 {
+        for (y, mask) in (rows.y0..rows.y1).zip(mask.chunks_exact_mut(rows.width())) {
             let ids = ids.row(y);
             Rows::at(attention, y).spread(simd, cells.clone(), row);
-            for x in (rows.x0..rows.x1).step_by(LANES) {
-                let inside = u32x16::from_slice(simd, &load(ids, x)).simd_eq(own);
+            for (x, mask) in (rows.x0..).step_by(LANES).zip(mask.chunks_mut(LANES)) {
+                // Beyond the box there is no pixel of this id.
+                let at = load(ids, x);
+                if let Some(mask) = mask.first_chunk_mut::<LANES>() {
+                    for i in 0..LANES {
+                        mask[i] = if at[i] == id { 255 } else { 0 };
+                    }
+                } else {
+                    for (mask, at) in mask.iter_mut().zip(at) {
+                        *mask = if at == id { 255 } else { 0 };
+                    }
+                }
+                let inside = u32x16::from_slice(simd, &at).simd_eq(own);
+                area += inside.to_bitmask().count_ones();
                 let s = inside.select(f32x16::from_slice(simd, &load(row, x)), zero);
                 sum += s;
                 most = most.max(s);
             }
         }
+        self.area += f64::from(area);
         self.saliency += total(sum);
         for value in most.as_slice() {
             self.max_saliency = self.max_saliency.max(*value);
@@ -156,8 +174,8 @@ impl Sums {
         self.asked += total(asked);
     }
 
+    /// Of one in so many rows.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "a kernel: structs of slices would hide them")]
     fn add<S: Simd>(
         &mut self,
         simd: S,
@@ -166,40 +184,28 @@ impl Sums {
         ids: &Image<u32>,
         source: &RegionSource<'_>,
         centre: &Centre,
-        mask: &mut [u8],
     ) {
         let zero = f32x16::splat(simd, 0.0);
         let one = f32x16::splat(simd, 1.0);
         let most = f32x16::splat(simd, f32::MAX);
         let own = u32x16::splat(simd, id);
-        let [mut area, mut valid, mut finite, mut inliers] = [zero; 4];
+        let [mut looked, mut valid, mut finite, mut inliers] = [zero; 4];
         let [mut d1, mut d2, mut z1, mut z2] = [zero; 4];
         let [mut u1, mut u2, mut v1, mut v2, mut e1, mut e2] = [zero; 6];
         let [mut w, mut uw, mut vw] = [zero; 3];
         let lane = f32x16::from_fn(simd, |i| i as f32);
         let depth_scale = source.rig.depth_scale() as f32;
-        for (y, mask) in (rows.y0..rows.y1).zip(mask.chunks_exact_mut(rows.width())) {
+        for y in (rows.y0..rows.y1).step_by(centre.every) {
             let v = f32x16::splat(simd, y as f32 - centre.v);
             let (d_row, id_row) = (source.disparity.row(y), ids.row(y));
-            for (x, mask) in (rows.x0..).step_by(LANES).zip(mask.chunks_mut(LANES)) {
-                // Beyond the box there is no pixel of this id.
-                let at = load(id_row, x);
-                let inside = u32x16::from_slice(simd, &at).simd_eq(own);
+            for x in (rows.x0..rows.x1).step_by(LANES) {
+                let inside = u32x16::from_slice(simd, &load(id_row, x)).simd_eq(own);
                 if inside.to_bitmask() == 0 {
                     continue;
                 }
-                if let Some(mask) = mask.first_chunk_mut::<LANES>() {
-                    for i in 0..LANES {
-                        mask[i] = if at[i] == id { 255 } else { 0 };
-                    }
-                } else {
-                    for (mask, at) in mask.iter_mut().zip(at) {
-                        *mask = if at == id { 255 } else { 0 };
-                    }
-                }
                 let d = f32x16::from_slice(simd, &load(d_row, x));
                 let z = centre.limits.of_lanes(simd, d, depth_scale);
-                area += inside.select(one, zero);
+                looked += inside.select(one, zero);
 
                 let known = inside & d.simd_eq(d);
                 let d = known.select(d - centre.disparity, zero);
@@ -230,7 +236,7 @@ impl Sums {
                 vw += v * z;
             }
         }
-        self.area += total(area);
+        self.looked += total(looked);
         self.valid += total(valid);
         self.finite += total(finite);
         self.inliers += total(inliers);
