@@ -81,9 +81,12 @@ impl Upright {
             while let Some((id, cells)) = run(row, next) {
                 next = cells.end;
                 self.number[id as usize - 1] += cells.len() as u32;
-                let middle = |cx: usize| (cx * WIDE + WIDE / 2).min(pixels.len() - 1);
-                let salient = cells.filter(|&cx| pixels[middle(cx)] != 0).count();
-                self.salient[id as usize - 1] += salient as u32;
+                // The right pixel of a cell, where there is one.
+                let pixels = &pixels[cells.start * WIDE..(cells.end * WIDE).min(pixels.len())];
+                let (pairs, cut) = pixels.as_chunks::<WIDE>();
+                let salient: u32 = pairs.iter().map(|pair| u32::from(pair[WIDE / 2] != 0)).sum();
+                let cut = cut.last().is_some_and(|pixel| *pixel != 0);
+                self.salient[id as usize - 1] += salient + u32::from(cut);
             }
         }
         let mut count = 0;
@@ -91,6 +94,9 @@ impl Upright {
             let chosen = salient as f32 >= LEAST_SALIENT * *number as f32 && salient > 0;
             count += u32::from(chosen);
             *number = if chosen { count } else { 0 };
+        }
+        if count as usize == self.number.len() {
+            return self.number.len();
         }
         for cy in 0..self.things.ids.height() {
             let row = self.things.ids.row_mut(cy);

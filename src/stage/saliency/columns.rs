@@ -45,7 +45,7 @@ pub struct Columns {
     /// Running means of what was averaged last, from the base up.
     mean: Image<f32>,
     /// What one row hands on to the next.
-    state: [Vec<f32>; 3],
+    state: [Vec<f32>; 4],
 }
 
 impl Columns {
@@ -61,15 +61,15 @@ impl Columns {
         self.part.resize(size);
         self.mean.resize(size);
         self.clear_state(size.width);
-        let Self { level, part, mean, state: [sum, count, last] } = self;
+        let Self { level, part, mean, state: [sum, count, last, so_far] } = self;
         dispatch!(*level, _simd => {
             for y in (0..size.height).rev() {
-                let below = Surface { sum, count, last };
+                let below = Surface { sum, count, last, so_far };
                 climb(below, disparity.row(y), plane, y, part.row_mut(y), mean.row_mut(y));
             }
         });
         self.clear_state(size.width);
-        let Self { level, part, mean, state: [carried, inside, _] } = self;
+        let Self { level, part, mean, state: [carried, inside, ..] } = self;
         dispatch!(*level, _simd => {
             for y in 0..size.height {
                 let cells = part.row(y).iter().zip(mean.row(y)).zip(disparity.row_mut(y));
@@ -101,7 +101,7 @@ impl Columns {
     ) {
         let size = disparity.size();
         self.clear_state(size.width);
-        let Self { level, part, mean, state: [sum, count, _] } = self;
+        let Self { level, part, mean, state: [sum, count, ..] } = self;
         dispatch!(*level, _simd => {
             for y in (0..size.height).rev() {
                 let cells = part.row(y).iter().zip(cue.row(y)).zip(mean.row_mut(y));
@@ -115,7 +115,7 @@ impl Columns {
             }
         });
         self.clear_state(size.width);
-        let Self { level, part, mean, state: [value, of, place] } = self;
+        let Self { level, part, mean, state: [value, of, place, _] } = self;
         dispatch!(*level, _simd => {
             for y in 0..size.height {
                 let above = Carried { value, of, place };
@@ -144,6 +144,8 @@ struct Surface<'a> {
     sum: &'a mut [f32],
     count: &'a mut [f32],
     last: &'a mut [f32],
+    /// Its mean.
+    so_far: &'a mut [f32],
 }
 
 #[inline(always)]
@@ -156,24 +158,24 @@ fn climb(
     mean: &mut [f32],
 ) {
     let (lowest, noise) = (EVIDENCE_M * plane.scale(), NOISE_PX * plane.camera_height_m);
-    let state = below.sum.iter_mut().zip(below.count).zip(below.last);
+    let state = below.sum.iter_mut().zip(below.count).zip(below.last).zip(below.so_far);
     let cells = disparity.iter().zip(part).zip(mean);
-    for (x, (((&d, part), mean), ((sum, count), last))) in cells.zip(state).enumerate() {
+    for (x, (((&d, part), mean), (((sum, count), last), so_far))) in cells.zip(state).enumerate() {
         let (u, v) = cell_centre(x, y);
         // Heights multiplied by d.
         let height = plane.camera_height_m * (d - plane.disparity(u, v));
         let stands = d > LEAST_DISPARITY && height >= lowest * d + noise && height <= HIGH_M * d;
-        let so_far = *sum / count.max(1.0);
         let goes_on = stands
             && *count > 0.0
             && (d - *last).abs() <= (NEXT_PART * d).max(NEXT_PX)
-            && (d - so_far).abs() <= MEAN_PART * d;
+            && (d - *so_far).abs() <= MEAN_PART * d;
         let begun = if stands { 1.0 } else { 0.0 };
         *sum = if goes_on { *sum + d } else { d };
         *count = if goes_on { *count + 1.0 } else { begun };
         *last = d;
         *part = if goes_on { ABOVE } else { begun };
-        *mean = *sum / count.max(1.0);
+        *so_far = *sum / count.max(1.0);
+        *mean = *so_far;
     }
 }
 

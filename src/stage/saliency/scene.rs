@@ -13,7 +13,7 @@ use super::ego::EgoMotion;
 use super::{AttentionScene, Scene};
 use crate::image::Image;
 use crate::perception::View;
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use crate::stage::ground::{Footing, Ground};
 use crate::stage::table::Table;
 
@@ -132,12 +132,12 @@ impl SceneSaliency {
     fn scale_disparity(&mut self, filled: &Image<f32>) {
         self.fourth.resize(filled.size());
         let out = self.fourth.pixels_mut();
-        dispatch!(self.level, _simd => scale_to_bytes(filled.pixels(), out));
+        dispatch!(self.level, simd => scale_to_bytes(simd, filled.pixels(), out));
     }
 }
 
 #[inline(always)]
-fn scale_to_bytes(values: &[f32], out: &mut [u8]) {
+fn scale_to_bytes<S: Simd>(simd: S, values: &[f32], out: &mut [u8]) {
     // The largest of every sixteenth value, and of those.
     let mut largest = [1.0_f32; 16];
     let (whole, rest) = values.as_chunks::<16>();
@@ -147,8 +147,15 @@ fn scale_to_bytes(values: &[f32], out: &mut [u8]) {
         }
     }
     let largest = largest.iter().chain(rest).fold(1.0_f32, |most, &value| most.max(value));
-    for (out, &value) in out.iter_mut().zip(values) {
-        // To a wide integer first: that is one instruction.
-        *out = (value / largest * 255.0).max(0.0) as i32 as u8;
+    let out = out.as_chunks_mut::<16>();
+    for (out, values) in out.0.iter_mut().zip(whole) {
+        let bytes = (f32x16::from_slice(simd, values) / largest * 255.0).max(0.0);
+        let bytes: u32x16<S> = bytes.to_int();
+        for (out, byte) in out.iter_mut().zip(bytes.as_slice()) {
+            *out = *byte as u8;
+        }
+    }
+    for (out, &value) in out.1.iter_mut().zip(rest) {
+        *out = (value / largest * 255.0).max(0.0) as u8;
     }
 }

@@ -65,8 +65,8 @@ impl Kinds {
         }
         self.heights.resize(disparity.size());
         dispatch!(level, simd => {
-            for x in (0..disparity.width()).step_by(LANES) {
-                for y in (0..disparity.height()).step_by(ROWS) {
+            for y in (0..disparity.height()).step_by(ROWS) {
+                for x in (0..disparity.width()).step_by(LANES) {
                     self.look(simd, x, y, disparity, plane);
                 }
             }

@@ -84,11 +84,14 @@ impl Painter {
     ) {
         out.clear(source.disparity.size(), count);
         self.fit(things.ids.width(), plane);
+        let mut used = false;
         for cy in 0..things.ids.height() {
             let row = things.ids.row(cy);
             let next = cy + 1;
             let below = if next < things.ids.height() { things.ids.row(next) } else { &[] };
-            if row.iter().chain(below).all(|id| *id == 0) {
+            let own = std::mem::replace(&mut used, below.iter().fold(0, |any, id| any | id) != 0);
+            // The first row has not been looked at.
+            if cy > 0 && !own && !used {
                 continue;
             }
             self.own[1..=row.len()].copy_from_slice(row);
