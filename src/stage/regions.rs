@@ -95,7 +95,7 @@ pub struct Regions {
     upright: Upright,
     raised: Raised,
     candidates: Candidates,
-    /// Ids of the candidates that are large enough, and what speaks for each.
+    /// The candidates that are large enough, counted from 1, and what speaks for each.
     ids: Vec<u32>,
     evidence: Vec<Evidence>,
     /// One for each thread. Which of them gets which regions does not depend on
@@ -196,6 +196,7 @@ impl Regions {
             |(((regions, evidence), ids), worker)| {
                 for ((region, evidence), &id) in regions.iter_mut().zip(evidence).zip(ids) {
                     let bounds = &candidates.boxes[id as usize - 1];
+                    let id = candidates.first + id - 1;
                     *evidence = worker.measure.run(id, bounds, &candidates.ids, source, region);
                     region.confidence = confidence(region);
                 }

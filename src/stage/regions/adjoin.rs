@@ -57,7 +57,7 @@ impl Adjoin {
 
     /// Walks along all outlines.
     fn trace(&mut self, candidates: &Candidates) {
-        let Candidates { ids, boxes } = candidates;
+        let Candidates { ids, boxes, .. } = candidates;
         self.edges.clear();
         self.outline.clear();
         self.outline.resize(boxes.len(), 0);
@@ -142,7 +142,7 @@ mod tests {
             b
         };
         let boxes: Vec<_> = (1..=rectangles.len() as u32).map(|id| measure(&ids, id)).collect();
-        let mut candidates = Candidates { ids, boxes };
+        let mut candidates = Candidates { ids, first: 1, boxes };
         let joined = Adjoin::default().run(&mut candidates);
         let empty = candidates.boxes.iter().filter(|b| b.area == 0).count();
         assert_eq!(joined as usize, empty);

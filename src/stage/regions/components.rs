@@ -79,25 +79,25 @@ impl PixelBox {
 /// What may become a region: an id for every pixel, and a box for every id.
 #[derive(Debug, Default)]
 pub struct Candidates {
-    /// 0 background, else 1 + index into `boxes`.
+    /// `first` + index into `boxes`; 0 and what is below `first` is background.
     pub ids: Image<u32>,
+    /// Id of the first box.
+    pub first: u32,
     /// Tight box of each candidate; of area 0 where it is none (any more).
     pub boxes: Vec<PixelBox>,
 }
 
 impl Candidates {
-    /// No pixel belongs to any of `count` candidates.
+    /// No pixel belongs to any of `count` candidates: their ids are others than
+    /// those of the frame before, which stand.
     pub fn clear(&mut self, size: Size, count: usize) {
-        if self.ids.size() == size {
-            // What is set lies in the boxes.
-            for b in self.boxes.iter().filter(|b| b.x0 < b.x1) {
-                for y in b.y0..b.y1 {
-                    self.ids.row_mut(y)[b.x0..b.x1].fill(0);
-                }
-            }
+        let next = self.first as usize + self.boxes.len();
+        if self.ids.size() == size && next + count < PENDING as usize {
+            self.first = next as u32;
         } else {
             self.ids.resize(size);
             self.ids.fill(0);
+            self.first = 1;
         }
         self.boxes.clear();
         self.boxes.resize(count, PixelBox::NONE);
@@ -105,6 +105,7 @@ impl Candidates {
 
     /// Numbers the boxes again from `ids`, of which there are `count`.
     fn measure_boxes(&mut self, count: usize) {
+        self.first = 1;
         self.boxes.clear();
         self.boxes.resize(count, PixelBox::NONE);
         let width = self.ids.width();

@@ -52,7 +52,7 @@ pub struct Trim<'a> {
 }
 
 impl Trim<'_> {
-    /// Moves both ends of every row of candidate `id` inward to the strongest
+    /// Moves both ends of every row of candidate `id`, counted from 1, inward to the strongest
     /// upright edge (maximum over R, G and B of |I(x + 1) − I(x − 1)|, added up
     /// over four of seven rows) within six pixels and a third of the row. An end at
     /// something nearer stays: there it is the other thing that grew.
@@ -63,12 +63,13 @@ impl Trim<'_> {
     #[inline(always)]
     fn cut<S: Simd>(&self, simd: S, id: u32, out: &mut Candidates) {
         let bounds = out.boxes[id as usize - 1];
+        let own = out.first + id - 1;
         let mut cut = PixelBox::NONE;
         for y in bounds.y0..bounds.y1 {
             let mut next = bounds.x0;
             while let Some((other, pixels)) = run(&out.ids.row(y)[..bounds.x1], next) {
                 next = pixels.end;
-                if other != id {
+                if other != own {
                     continue;
                 }
                 let [left, right] = self.ends(simd, pixels.start, pixels.end, y);

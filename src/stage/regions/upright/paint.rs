@@ -201,7 +201,7 @@ impl Painter {
                         // The left pixel of a cell tells.
                         bits |= holes & (inside | ((none & LEFT) * CELL_BITS));
                     }
-                    write(&mut out.ids.row_mut(y)[x..], id, bits);
+                    write(&mut out.ids.row_mut(y)[x..], out.first + id - 1, bits);
                     painted.add(x, y, bits);
                 }
             }
