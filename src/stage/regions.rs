@@ -198,7 +198,8 @@ impl Regions {
                     let bounds = &candidates.boxes[id as usize - 1];
                     let id = candidates.first + id - 1;
                     *evidence = worker.measure.run(id, bounds, &candidates.ids, source, region);
-                    region.confidence = confidence(region);
+                    let followed = candidates.followed_of(id);
+                    region.confidence = confidence(region, followed);
                 }
             },
         );
@@ -275,10 +276,11 @@ fn share(regions: usize, workers: &[Worker]) -> usize {
 
 /// Probability that a region is a thing of this outline (mask IoU of at least
 /// one half): logistic in the logarithm of its area and in the share of its
-/// pixels with disparity.
-fn confidence(region: &Region) -> f32 {
-    let area = (region.area as f32 / 1000.0).ln();
-    let score = CERTAINTY + PER_AREA * area + PER_VALID * region.valid_fraction;
+/// pixels with disparity, less those that were `followed` where nothing was matched.
+fn confidence(region: &Region, followed: usize) -> f32 {
+    let area = region.area as f32;
+    let valid = region.valid_fraction * area / (area - followed as f32).max(1.0);
+    let score = CERTAINTY + PER_AREA * (area / 1000.0).ln() + PER_VALID * valid.min(1.0);
     1.0 / (1.0 + (-score).exp())
 }
 

@@ -142,7 +142,7 @@ mod tests {
             b
         };
         let boxes: Vec<_> = (1..=rectangles.len() as u32).map(|id| measure(&ids, id)).collect();
-        let mut candidates = Candidates { ids, first: 1, boxes };
+        let mut candidates = Candidates { ids, first: 1, boxes, followed: Vec::new() };
         let joined = Adjoin::default().run(&mut candidates);
         let empty = candidates.boxes.iter().filter(|b| b.area == 0).count();
         assert_eq!(joined as usize, empty);

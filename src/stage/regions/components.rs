@@ -85,6 +85,9 @@ pub struct Candidates {
     pub first: u32,
     /// Tight box of each candidate; of area 0 where it is none (any more).
     pub boxes: Vec<PixelBox>,
+    /// Candidates with pixels beyond what was matched, that the image alone shows, and
+    /// how many.
+    pub followed: Vec<(u32, usize)>,
 }
 
 impl Candidates {
@@ -99,15 +102,24 @@ impl Candidates {
             self.ids.fill(0);
             self.first = 1;
         }
+        self.forget_boxes(count);
+    }
+
+    fn forget_boxes(&mut self, count: usize) {
         self.boxes.clear();
         self.boxes.resize(count, PixelBox::NONE);
+        self.followed.clear();
+    }
+
+    /// How many pixels of candidate `id` the image alone shows.
+    pub fn followed_of(&self, id: u32) -> usize {
+        self.followed.iter().find(|(other, _)| *other == id).map_or(0, |(_, pixels)| *pixels)
     }
 
     /// Numbers the boxes again from `ids`, of which there are `count`.
     fn measure_boxes(&mut self, count: usize) {
         self.first = 1;
-        self.boxes.clear();
-        self.boxes.resize(count, PixelBox::NONE);
+        self.forget_boxes(count);
         let width = self.ids.width();
         for (y, row) in self.ids.rows().enumerate() {
             let mut x = 0;

@@ -224,7 +224,7 @@ mod tests {
         let ids = Image::from_fn(size, |x, y| u32::from(inside(x as f32, y as f32)));
         let area = ids.pixels().iter().filter(|id| **id == 1).count();
         let whole = PixelBox { x0: 0, y0: 0, x1: size.width, y1: size.height, area };
-        let mut candidates = Candidates { ids, first: 1, boxes: vec![whole] };
+        let mut candidates = Candidates { ids, first: 1, boxes: vec![whole], followed: Vec::new() };
         Part::default().run(1, &mut candidates);
         for (id, b) in (1..).zip(&candidates.boxes) {
             let mut pixels = Vec::new();

@@ -1,6 +1,7 @@
 //! Regions of things that stand on the ground, from the fine disparity.
 
 mod paint;
+mod post;
 mod shrink;
 
 use super::RegionSource;
@@ -14,6 +15,7 @@ use crate::stage::ground::Plane;
 use crate::stage::roi::bits::BitMask;
 use crate::stage::standing::{HIGH, Standing, Things, WIDE, size_scale};
 use paint::Painter;
+use post::{Posts, Stump};
 use shrink::shrink;
 
 /// Share of a thing's cells that must be salient.
@@ -25,6 +27,7 @@ pub struct Upright {
     standing: Standing,
     things: Things,
     painter: Painter,
+    posts: Posts,
     cells: Image<f32>,
     /// The cells whose disparity is a fine one.
     fine: BitMask,
@@ -40,6 +43,7 @@ impl Upright {
             standing: Standing::new(level),
             things: Things::default(),
             painter: Painter::new(level),
+            posts: Posts::default(),
             cells: Image::default(),
             fine: BitMask::default(),
             salient: Vec::new(),
@@ -63,6 +67,7 @@ impl Upright {
         let count = self.choose(&source.roi.salient);
         self.painter.run(plane, source, (&self.things, &self.fine), count, out);
         self.trim(plane, source, out);
+        self.follow(plane, source, out);
         rejections.floating = self.things.floating;
         rejections.background = self.things.background;
         rejections.not_salient = (self.things.list.len() - count) as u32;
@@ -122,6 +127,20 @@ impl Upright {
             let surface = source.rig.depth_scale() as f32 / depth;
             let trim = Trim { left: source.left, disparity: source.disparity, surface };
             trim.run(self.level, id, out);
+        }
+    }
+
+    /// Follows what may be posts up to their ends.
+    fn follow(&mut self, plane: &Plane, source: &RegionSource<'_>, out: &mut Candidates) {
+        for (thing, &id) in self.things.list.iter().zip(&self.number).filter(|(_, id)| **id != 0) {
+            let depth = thing.depth_m[0].midpoint(thing.depth_m[1]);
+            let stump = Stump {
+                left: source.left,
+                plane,
+                disparity: source.rig.depth_scale() as f32 / depth,
+                metre_px: source.rig.focal_px() as f32 / depth,
+            };
+            self.posts.run(&stump, id, out);
         }
     }
 }
