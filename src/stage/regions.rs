@@ -1,6 +1,7 @@
 //! Salient regions with their measures.
 
 pub mod adjoin;
+pub mod candidates;
 pub mod components;
 pub mod contour;
 pub mod measure;
@@ -24,7 +25,8 @@ use crate::simd::{Level, dispatch};
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::depth::Depth;
 use crate::stage::ground::Plane;
-use components::{Candidates, Components};
+use candidates::Candidates;
+use components::Components;
 use contour::Contour;
 use measure::{Evidence, Measure};
 use raised::Raised;

@@ -3,7 +3,7 @@
 //! Seen from above the neck of a bottle or the rim of a cup is so much nearer
 //! than the rest that it is a surface of its own, but nothing floats over a table.
 
-use super::components::{Candidates, PixelBox};
+use super::candidates::{Candidates, PixelBox};
 
 /// Share of its outline along which a candidate lies against another one to be
 /// a part of it: two boxes side by side share a quarter.

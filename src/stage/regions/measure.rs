@@ -3,7 +3,7 @@
 mod sums;
 
 use super::RegionSource;
-use super::components::PixelBox;
+use super::candidates::PixelBox;
 use crate::camera::StereoRig;
 use crate::image::Image;
 use crate::perception::Region;

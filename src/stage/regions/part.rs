@@ -1,6 +1,6 @@
 //! Parts two things that hang together by a thread: a cable, a handle's shadow.
 
-use super::components::{Candidates, PixelBox};
+use super::candidates::{Candidates, PixelBox};
 
 /// A neck is parted when it is narrower than this part of the narrower thing: the
 /// grip of a drill has .6 of it, half parts ragged masks, a quarter does like a third.

@@ -2,7 +2,8 @@
 
 use super::RegionSource;
 use super::adjoin::Adjoin;
-use super::components::{Candidates, Components, PixelBox};
+use super::candidates::{Candidates, PixelBox};
+use super::components::Components;
 use super::part::Part;
 use crate::image::Image;
 use crate::simd::Level;

@@ -7,7 +7,7 @@
 //! Ma et al., "Constant Time Weighted Median Filtering for Stereo Matching and
 //! Beyond", ICCV 2013, which asks the colours of every pixel).
 
-use super::components::{Candidates, PixelBox};
+use super::candidates::{Candidates, PixelBox};
 use super::runs::run;
 use crate::image::Image;
 use crate::perception::View;

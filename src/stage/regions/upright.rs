@@ -5,7 +5,7 @@ mod post;
 mod shrink;
 
 use super::RegionSource;
-use super::components::Candidates;
+use super::candidates::Candidates;
 use super::runs::run;
 use super::trim::{NARROW_M, Trim};
 use crate::image::Image;

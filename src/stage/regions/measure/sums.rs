@@ -5,7 +5,7 @@ use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use crate::stage::coarse::CELL;
 use crate::stage::depth::Depth;
 use crate::stage::regions::RegionSource;
-use crate::stage::regions::components::PixelBox;
+use crate::stage::regions::candidates::PixelBox;
 use crate::stage::saliency::upsample::Rows;
 
 /// Pixels that are added at once, whatever the level: the order of the

@@ -3,7 +3,8 @@
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u8x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;
-use crate::stage::regions::components::{Candidates, PixelBox, tolerance};
+use crate::stage::regions::candidates::{Candidates, PixelBox};
+use crate::stage::regions::components::tolerance;
 use crate::stage::regions::runs::run;
 use crate::stage::roi::bits::{BitMask, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};

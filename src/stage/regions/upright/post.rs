@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::image::Image;
 use crate::perception::View;
 use crate::stage::ground::Plane;
-use crate::stage::regions::components::{Candidates, PixelBox};
+use crate::stage::regions::candidates::{Candidates, PixelBox};
 use crate::stage::standing::size_scale;
 
 /// Width of the widest post, metres (of a road scene); a trunk is wider.
