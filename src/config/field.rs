@@ -226,7 +226,7 @@ pub const FIELDS: &[Field] = &[
     live(
         "regions.min_area",
         Integer(1, 10_000_000),
-        "Smallest region in pixels. On a ground or table regions of a confidence below 0.2 are refused as well: small ones with few disparities.",
+        "Smallest region in pixels. On a ground or table regions of a confidence below 0.31 are refused as well: small ones with few disparities.",
     ),
     live(
         "regions.max_count",
@@ -246,7 +246,11 @@ pub const FIELDS: &[Field] = &[
         Integer(1, 3),
         "Of the last three frames, those in which a track must be seen before it is active.",
     ),
-    live("tracking.max_age", Real(0.0, 60.0), "Seconds that a track lives on without being seen."),
+    live(
+        "tracking.max_age",
+        Real(0.0, 60.0),
+        "Seconds for which a track that is not seen is published as coasted at most; its id is remembered three times as long.",
+    ),
     live(
         "lazy",
         Bool,

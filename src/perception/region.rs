@@ -9,9 +9,9 @@ pub enum TrackState {
     /// Tracking is off.
     #[default]
     None = 0,
-    /// First frame of this track.
+    /// Not seen often enough yet (`tracking.confirm` of three frames).
     New = 1,
-    /// Matched to an earlier frame.
+    /// Seen often enough.
     Active = 2,
     /// Predicted, not seen in this frame.
     Coasted = 3,

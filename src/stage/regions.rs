@@ -199,7 +199,7 @@ impl Regions {
                 for ((region, evidence), &id) in regions.iter_mut().zip(evidence).zip(ids) {
                     let bounds = &candidates.boxes[id as usize - 1];
                     let id = candidates.first + id - 1;
-                    *evidence = worker.measure.run(id, bounds, &candidates.ids, source, region);
+                    *evidence = worker.measure.run(id, bounds, candidates, source, region);
                     let followed = candidates.followed_of(id);
                     region.confidence = confidence(region, followed);
                 }

@@ -14,8 +14,10 @@ use follow::{Box2, Follow, Life};
 
 /// An active track is remembered for so many times `tracking.max_age`.
 const REMEMBERED: f64 = 3.0;
+/// So many at most, the latest: each is held against every region.
+const MOST_REMEMBERED: usize = 64;
 /// What the score of one that was given up is multiplied by: tracks that are
-/// followed come first.
+/// followed come first as a rule.
 const LOST: f32 = 0.5;
 /// Squared Mahalanobis distance beyond which two positions are not the same
 /// point: 99.9 % of the chi-squared distribution with 3 degrees of freedom.
@@ -118,15 +120,17 @@ impl Track {
     ///
     /// Then the track is given up; what was never active is so after two frames and is
     /// counted as `unstable`. An active one is remembered for three times
-    /// `tracking.max_age`, another one once: a region of its size where it is
-    /// predicted, which continues no other track better, takes its id back.
+    /// `tracking.max_age`, another one once, the latest 64 of them: a region of its
+    /// size where it is predicted, which continues no other track better, takes its
+    /// id back.
     ///
     /// A coasted region is published only where the thing probably still is: at least 82 %
     /// of its predicted pixels must show in `disparity` (pixels, NaN where there is
     /// none) its own distance, outside of the regions of this frame in `labels`,
     /// or something nearer that hides it. What lies behind it, a region at the same
-    /// distance (the thing under another identity) and what was not measured
-    /// do not speak for it. Things that never had a position are published.
+    /// distance (the thing under another identity) and what was not measured (of a
+    /// post, what is above the region of interest) do not speak for it. Things that
+    /// never had a position are published.
     ///
     /// A stamp that goes back, or more than 5 s ahead, resets the tracker.
     pub fn run(
@@ -212,6 +216,14 @@ impl Track {
             let remembered = if track.active { REMEMBERED } else { 1.0 };
             if unseen > remembered * self.max_age {
                 track.life = Life::Over;
+            }
+        }
+        let lost = self.tracks.iter().filter(|t| t.life == Life::Lost).count();
+        for _ in MOST_REMEMBERED..lost {
+            let lost = self.tracks.iter_mut().filter(|t| t.life == Life::Lost);
+            let age = |t: &Follow| t.unseen_for(stamp);
+            if let Some(oldest) = lost.max_by(|a, b| age(a).total_cmp(&age(b))) {
+                oldest.life = Life::Over;
             }
         }
     }
@@ -312,13 +324,13 @@ impl Views<'_> {
 fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     let bounds = Box2::of(region);
     let iou = track.bounds.iou(&bounds);
-    let distance = track.distance(region);
-    if distance.is_some_and(|d| d > GATE) {
-        return None;
-    }
     let same_size = track.bounds.growth(&bounds).iter().zip(MAX_GROWTH).all(|(g, most)| *g <= most);
     let lost = track.life == Life::Lost;
     if lost && !same_size {
+        return None;
+    }
+    let distance = track.distance(region);
+    if distance.is_some_and(|d| d > GATE) {
         return None;
     }
     let nearness = 1.0 / (1.0 + distance.unwrap_or(0.0) / GATE) as f32;

@@ -7,12 +7,14 @@ use proptest::prelude::*;
 use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
-use salient_stereo::perception::{RegionList, Rejections, RoiMask, View};
+use salient_stereo::perception::{Region, RegionList, Rejections, RoiMask, View};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
-use salient_stereo::stage::regions::candidates::Candidates;
+use salient_stereo::stage::depth::Depth;
+use salient_stereo::stage::regions::candidates::{Candidates, PixelBox};
 use salient_stereo::stage::regions::components::{Components, agree};
 use salient_stereo::stage::regions::contour::Contour;
+use salient_stereo::stage::regions::measure::Measure;
 use salient_stereo::stage::regions::{RegionSource, Regions, priority};
 use salient_stereo::stage::saliency::upsample;
 
@@ -281,6 +283,8 @@ struct Boxes {
     attention: Image<f32>,
     disparity: Image<f32>,
     confidence: Image<f32>,
+    left: View,
+    coarse: CoarseDisparity,
 }
 
 impl Boxes {
@@ -292,6 +296,8 @@ impl Boxes {
             attention: Image::filled(size.divided_by(4), 0.8),
             disparity: Image::filled(size, f32::NAN),
             confidence: Image::filled(size, 0.9),
+            left: View::default(),
+            coarse: CoarseDisparity::default(),
         }
     }
 
@@ -304,21 +310,25 @@ impl Boxes {
         }
     }
 
+    fn source<'a>(&'a self, rig: &'a StereoRig, roi: &'a RoiMask) -> RegionSource<'a> {
+        RegionSource {
+            left: &self.left,
+            attention: &self.attention,
+            roi,
+            disparity: &self.disparity,
+            coarse: &self.coarse,
+            confidence: &self.confidence,
+            rig,
+            plane: None,
+            table: None,
+        }
+    }
+
     fn run(&self, config: &Config) -> (Image<u16>, RegionList, Rejections) {
         let rig = rig(self.size);
         let roi =
             RoiMask { salient: self.salient.clone(), matched: self.salient.clone(), fraction: 0.5 };
-        let source = RegionSource {
-            left: &View::default(),
-            attention: &self.attention,
-            roi: &roi,
-            disparity: &self.disparity,
-            coarse: &CoarseDisparity::default(),
-            confidence: &self.confidence,
-            rig: &rig,
-            plane: None,
-            table: None,
-        };
+        let source = self.source(&rig, &roi);
         let mut outs = simd::available().into_iter().map(|level| {
             let mut out = (Image::default(), RegionList::default(), Rejections::default());
             let mut regions = Regions::new(config, self.size, level);
@@ -389,6 +399,81 @@ fn statistics_follow_their_plain_formulas() {
     near(r.confidence, 1.0 / (1.0 + (-score).exp()));
     assert_eq!(r.mask.len(), 31 * 23);
     assert_eq!(r.mask.iter().filter(|m| **m != 0).count(), pixels.len());
+}
+
+/// Of large regions some rows are looked at; disparity is smooth over them.
+#[test]
+fn large_regions_have_the_statistics_of_all_their_pixels() {
+    for (w, h) in [(96, 83), (97, 107), (152, 127), (40, 301)] {
+        let mut scene = Boxes::new(w + 9, h + 11);
+        let hole = |u: usize, v: usize| (5 * u + 3 * v).is_multiple_of(11);
+        scene.add(5, 7, w, h, |u, v| {
+            if hole(u, v) { f32::NAN } else { 12.0 + 0.02 * u as f32 + 0.015 * v as f32 }
+        });
+        let (labels, regions, _) = scene.run(&Config::default());
+        let r = &regions[0];
+        assert_eq!((regions.len(), r.area as usize), (1, w * h), "all of {w} x {h}");
+        let mut d: Vec<f64> = (0..scene.size.area())
+            .filter(|&i| labels.pixels()[i] == 1)
+            .map(|i| f64::from(scene.disparity.pixels()[i]))
+            .filter(|d| !d.is_nan())
+            .collect();
+        let n = d.len() as f64;
+        let near = |name: &str, a: f64, b: f64, most: f64| {
+            assert!((a - b).abs() < most, "{w} x {h}, {name}: {a}, not {b}");
+        };
+        near("valid", f64::from(r.valid_fraction), n / (w * h) as f64, 0.01);
+        let mean = d.iter().sum::<f64>() / n;
+        let deviation = (d.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / n).sqrt();
+        near("mean disparity", f64::from(r.mean_disparity), mean, 0.03);
+        near("its deviation", f64::from(r.disparity_stddev), deviation, 0.02);
+        d.sort_by(f64::total_cmp);
+        for (part, depth) in [(0.95, r.near_depth), (0.5, r.median_depth), (0.05, r.far_depth)] {
+            let at = d[(part * (n - 1.0)) as usize];
+            near("percentile", F * BASELINE / f64::from(depth), at, 0.1);
+        }
+        // Means of X = (u - cx) Z / f and of Y over the pixels.
+        let (cx, cy) = (scene.size.width as f64 / 2.0, scene.size.height as f64 / 2.0);
+        let (mut x, mut y) = (0.0, 0.0);
+        for i in (0..scene.size.area()).filter(|&i| labels.pixels()[i] == 1) {
+            let z = BASELINE / f64::from(scene.disparity.pixels()[i]);
+            if !z.is_nan() {
+                x += ((i % scene.size.width) as f64 - cx) * z / n;
+                y += ((i / scene.size.width) as f64 - cy) * z / n;
+            }
+        }
+        near("x", r.position[0], x, 0.02);
+        near("y", r.position[1], y, 0.02);
+    }
+}
+
+/// A post whose lower half was matched is where its box is.
+#[test]
+fn a_post_that_was_followed_is_located_by_its_box() {
+    let mut scene = Boxes::new(64, 96);
+    scene.add(30, 44, 4, 44, |_, _| 10.0);
+    let rig = rig(scene.size);
+    let roi = RoiMask::default();
+    let source = scene.source(&rig, &roi);
+    let mut candidates =
+        Candidates { ids: Image::new(scene.size), first: 1, ..Candidates::default() };
+    for y in 8..88 {
+        candidates.ids.row_mut(y)[30..34].fill(1);
+    }
+    let bounds = PixelBox { x0: 30, y0: 8, x1: 34, y1: 88, area: 4 * 80 };
+    let measure = |candidates: &Candidates| {
+        let mut region = Region::default();
+        let depth = Depth::new(&Config::default());
+        Measure::new(simd::detect(), depth).run(1, &bounds, candidates, &source, &mut region);
+        region
+    };
+    // Z = 5 m, so that a pixel is 5 cm; the image's middle is row 48.
+    let stump = measure(&candidates);
+    assert!((stump.position[1] - (65.5 - 48.0) * 0.05).abs() < 1e-3, "{:?}", stump.position);
+    candidates.followed.push((1, 4 * 36));
+    let post = measure(&candidates);
+    assert!((post.position[1] - (48.0 - 48.0) * 0.05).abs() < 0.03, "{:?}", post.position);
+    assert!((post.extent[1] - 4.0).abs() < 1e-3 && post.position[2] == stump.position[2]);
 }
 
 #[test]

@@ -179,6 +179,52 @@ fn what_was_seen_once_is_expected_to_do_what_most_things_do() {
 }
 
 #[test]
+fn what_keeps_its_place_before_a_fast_camera_is_followed() {
+    // At 15 m/s people beside the road go by; a car ahead is as fast. It comes into
+    // view when frames have become rare.
+    let mut driver = Driver::new(&Config::default());
+    let car = Thing { at: [0.0, 0.4, 15.0], size: [1.8, 1.5] };
+    let mut first = None;
+    let times =
+        (0..20).map(|n| 0.05 * f64::from(n)).chain((1..3).map(|n| 0.95 + 0.4 * f64::from(n)));
+    for t in times {
+        let at = |z: f64| z - 15.0 * t;
+        let mut things = vec![person(-4.0, at(34.0)), person(3.0, at(36.0)), person(5.0, at(38.0))];
+        things.extend((t > 1.0).then_some(car));
+        let list = driver.frame(t, &things);
+        if let Some(car) = list.iter().find(|r| r.extent[0] == 1.8) {
+            let state = if first.is_none() { TrackState::New } else { TrackState::Active };
+            let id = *first.get_or_insert(car.track_id);
+            assert_eq!((car.track_id, car.track_state), (id, state), "at {t} s");
+        }
+    }
+    assert!(first.is_some());
+}
+
+#[test]
+fn the_latest_of_many_lost_tracks_are_remembered() {
+    const MOST: u32 = 64;
+    let mut driver = Driver::new(&Config::default());
+    let crowd = |from: u32| -> Vec<Thing> {
+        let place = |i| Thing {
+            at: [f64::from(i % 20) * 0.8 - 7.6, f64::from(i / 20) - 2.0, 20.0],
+            size: [0.3, 0.4],
+        };
+        (from..80).map(place).collect()
+    };
+    // The first ten are seen a little less long.
+    for frame in 0..6 {
+        driver.frame(f64::from(frame) * 0.1, &crowd(if frame < 5 { 0 } else { 10 }));
+    }
+    for frame in 6..16 {
+        driver.frame(f64::from(frame) * 0.1, &[]);
+    }
+    let ids: Vec<u32> = driver.frame(1.6, &crowd(0)).iter().map(|r| r.track_id).collect();
+    assert_eq!(ids.iter().filter(|id| **id <= 80).count() as u32, MOST);
+    assert!(ids[..10].iter().all(|id| *id > 80), "{ids:?}");
+}
+
+#[test]
 fn an_id_comes_back_to_what_is_the_same_thing_only() {
     let car = Thing { at: [0.0, 0.4, 8.0], size: [3.8, 1.5] };
     for (frames, thing, same) in [

@@ -122,3 +122,30 @@ impl Candidates {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The ids of earlier frames stand in the image and mean nothing, until they
+    /// run out.
+    #[test]
+    fn ids_are_used_once_until_they_run_out() {
+        let size = Size::new(3, 2);
+        let mut candidates = Candidates::default();
+        candidates.clear(size, 5);
+        assert_eq!((candidates.first, candidates.boxes.len()), (1, 5));
+        candidates.ids.fill(4);
+        candidates.clear(size, 2);
+        assert_eq!((candidates.first, candidates.ids.get(0, 0)), (6, 4));
+        candidates.first = Candidates::NEVER - 4;
+        candidates.clear(size, 1);
+        assert_eq!(candidates.first, Candidates::NEVER - 2);
+        candidates.ids.fill(Candidates::NEVER - 2);
+        candidates.clear(size, 1);
+        assert_eq!((candidates.first, candidates.ids.get(0, 0)), (1, 0));
+        candidates.ids.fill(1);
+        candidates.clear(Size::new(2, 2), 1);
+        assert_eq!((candidates.first, candidates.ids.get(1, 1)), (1, 0));
+    }
+}

@@ -3,7 +3,7 @@
 mod sums;
 
 use super::RegionSource;
-use super::candidates::PixelBox;
+use super::candidates::{Candidates, PixelBox};
 use crate::camera::StereoRig;
 use crate::image::Image;
 use crate::perception::Region;
@@ -19,24 +19,24 @@ const SYSTEMATIC_PX: f64 = 0.15;
 const BOUNDARY_PX: f64 = 0.5;
 /// Neighbouring pixels share their matching window: this many count as one.
 const PIXELS_PER_SAMPLE: f64 = 25.0;
-/// Of a thing of n times as many pixels one in n rows is looked at for its
-/// disparities, which are smooth over a matching window: but one in four at least,
-/// and no fewer rows than these.
+/// Of a thing of twice or four times as many pixels one in two or four rows is
+/// looked at for its disparities, which are smooth over a matching window: but no
+/// fewer rows than these.
 const MOST_PIXELS: usize = 4096;
-const MOST_EVERY: usize = 4;
 const LEAST_ROWS: usize = 8;
 /// Values of which percentiles are taken, about.
 const MOST_VALUES: usize = 1024;
 /// Columns by which the sample of a row lies beside that of the row above: a
-/// number that shares no factor with a usual step.
-const SHIFT: usize = 7;
+/// prime larger than a usual step.
+const SHIFT: usize = 61;
 /// Robust standard deviations within which a disparity counts for the centroid.
 const INLIER_SIGMAS: f32 = 3.0;
 
 /// What decides whether a candidate is a region, beside the region's own fields.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Evidence {
-    /// Mean confidence of the valid pixels in every fourth row; 0 when there is none.
+    /// Mean confidence of the valid pixels in every fourth row, of low regions in more;
+    /// 0 when there is none.
     pub mean_confidence: f32,
     /// Median disparity in pixels; NaN without a valid pixel.
     pub median_disparity: f32,
@@ -64,6 +64,9 @@ impl Measure {
     /// Fills box, mask and all measures of `region` from the pixels of `bounds`
     /// whose id is `id`. Label, track, contour and confidence are left alone.
     ///
+    /// Area, mask and saliency are those of all pixels, disparity and depth those of
+    /// every second row from 8192 pixels on, of every fourth from 16384 on.
+    ///
     /// Depth is a falling function of disparity, so that the percentiles of the
     /// one are those of the other; they are taken of a sample of the pixels
     /// with finite depth.
@@ -71,16 +74,22 @@ impl Measure {
         &mut self,
         id: u32,
         bounds: &PixelBox,
-        ids: &Image<u32>,
+        candidates: &Candidates,
         source: &RegionSource<'_>,
         region: &mut Region,
     ) -> Evidence {
+        let ids = &candidates.ids;
         (region.x, region.y) = (bounds.x0 as u32, bounds.y0 as u32);
         (region.width, region.height) = (bounds.width() as u32, bounds.height() as u32);
 
-        let every =
-            (bounds.area / MOST_PIXELS).min(MOST_EVERY).min(bounds.height() / LEAST_ROWS).max(1);
-        self.collect(id, bounds, ids, source, every);
+        let every = match (bounds.area / MOST_PIXELS).min(bounds.height() / LEAST_ROWS) {
+            0 | 1 => 1,
+            2 | 3 => 2,
+            _ => 4,
+        };
+        // As many are left out above as below: else the position would be too high.
+        let first = (bounds.height() - 1) % every / 2;
+        self.collect(id, bounds, ids, source, (first, every));
         let [far, low, middle, high, near] =
             percentiles(&mut self.sample, [0.05, 0.16, 0.5, 0.84, 0.95]);
         let spread = (high - low) / 2.0;
@@ -96,6 +105,8 @@ impl Measure {
             v: (bounds.y0 + bounds.y1) as f32 / 2.0,
             tolerance: (INLIER_SIGMAS * spread).max(1.0),
             every,
+            first,
+            followed: candidates.followed_of(id) > 0,
             limits: self.depth,
         };
         region.mask.resize(bounds.width() * bounds.height(), 0);
@@ -133,15 +144,15 @@ impl Measure {
         bounds: &PixelBox,
         ids: &Image<u32>,
         source: &RegionSource<'_>,
-        every: usize,
+        (first, every): (usize, usize),
     ) {
         let step = (bounds.area / every).div_ceil(MOST_VALUES).max(1);
         self.sample.resize(bounds.height().div_ceil(every) * bounds.width().div_ceil(step), 0.0);
         let scale = source.rig.depth_scale() as f32;
         let mut n = 0;
-        for y in (bounds.y0..bounds.y1).step_by(every) {
+        for (row, y) in (bounds.y0 + first..bounds.y1).step_by(every).enumerate() {
             let (d, ids) = (source.disparity.row(y), ids.row(y));
-            let from = bounds.x0 + y * SHIFT % step;
+            let from = bounds.x0 + row * SHIFT % step;
             for x in (from..bounds.x1).step_by(step) {
                 // What does not count is written over: nobody can foresee what does.
                 self.sample[n] = d[x];
@@ -155,7 +166,8 @@ impl Measure {
 /// Position with covariance, and extent.
 ///
 /// The centroid is that of the pixels with finite depth whose disparity lies
-/// within three robust standard deviations (at least 1 px) of the median. With
+/// within three robust standard deviations (at least 1 px) of the median; of a post
+/// that was followed beyond them it is at the middle of its height. With
 /// u, v the mean pixel and d the disparity of the mean depth, the covariance is
 /// J diag(σu², σv², σd²) Jᵀ, where J = ∂(X, Y, Z)/∂(u, v, d) of
 /// Z = fB/d, X = (u − cx) Z/fx, Y = (v − cy) Z/fy, and each σ² is a systematic
@@ -179,7 +191,9 @@ fn locate(bounds: &PixelBox, centre: &Centre, sums: &Sums, rig: &StereoRig, regi
     });
     let (u, v) = (f64::from(centre.u), f64::from(centre.v));
     let [z, uz, vz] = sums.weighted;
-    region.position = lens.point(u + uz / z, v + vz / z, z / n);
+    // What was followed beyond what was matched stands upright: its middle is the box's.
+    let middle = if centre.followed { v } else { v + vz / z };
+    region.position = lens.point(u + uz / z, middle, z / n);
     let [[u1, _], [v1, _], _] = sums.place;
     region.position_covariance =
         lens.covariance(u + u1 / n, v + v1 / n, region.position[2], variance);

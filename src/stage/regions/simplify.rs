@@ -57,7 +57,7 @@ impl Simplify {
 }
 
 /// A segment between two points. Whole numbers, in a form that vectors multiply:
-/// exact for images of up to 47 million pixels.
+/// exact for images with a diagonal of up to 9700 pixels.
 struct Line {
     from: [f64; 2],
     along: [f64; 2],

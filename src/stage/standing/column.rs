@@ -11,7 +11,7 @@ use crate::stage::roi::bits::{first_set, is_set, last_set};
 /// A segment that begins no higher than this stands on the ground, metres.
 const CONTACT_M: f32 = 0.6;
 /// A surface that reaches higher than a lorry is part of a building, a tree or a pole.
-const TALL_M: f32 = 4.2;
+pub const TALL_M: f32 = 4.2;
 /// Cells without disparity that a segment may span.
 const MAX_HOLES: usize = 2;
 /// Cells of a segment, at least: what is shorter is a mixture of two surfaces at

@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 /// Standard deviation of the acceleration that the model leaves out, m/s².
 const ACCELERATION: f64 = 3.0;
 /// Standard deviation of the velocity of what was seen once, m/s per axis: where
-/// nothing is known, and around what most things do.
+/// nothing is known, and around what most things do. As likely as a walker among
+/// what stands is what keeps its place before the camera: a car ahead.
 const FIRST_VELOCITY: f64 = 10.0;
 const OWN_VELOCITY: f64 = 3.0;
 /// Added to every measured variance, m²: a tracked point is not a rigid one.
@@ -32,10 +33,11 @@ impl Kalman {
         state.fixed_rows_mut::<3>(0).copy_from(&position);
         let mut p = Matrix6::zeros();
         p.fixed_view_mut::<3, 3>(0, 0).copy_from(&noise);
-        let deviation = if expected.is_some() { OWN_VELOCITY } else { FIRST_VELOCITY };
-        p.fixed_view_mut::<3, 3>(3, 3).fill_diagonal(deviation * deviation);
-        if let Some(velocity) = expected {
-            state.fixed_rows_mut::<3>(3).copy_from_slice(velocity);
+        for axis in 0..3 {
+            let velocity = expected.map(|velocity| velocity[axis]);
+            state[3 + axis] = velocity.unwrap_or(0.0);
+            p[(3 + axis, 3 + axis)] =
+                velocity.map_or(FIRST_VELOCITY.powi(2), |v| OWN_VELOCITY.powi(2) + v * v);
         }
         Some(Self { state, covariance: p })
     }

@@ -13,7 +13,8 @@ use crate::stage::saliency::upsample::Rows;
 const LANES: usize = 16;
 /// Rows whose sums are kept in single precision.
 const ROWS: usize = 32;
-/// One in so many rows is asked for its confidence.
+/// One in so many rows is asked for its confidence, in a region that is at least
+/// eight times as high.
 const ASKED: usize = 4;
 
 const _: () = assert!(ROWS.is_multiple_of(ASKED));
@@ -32,8 +33,12 @@ pub struct Centre {
     pub v: f32,
     /// Largest difference from `disparity` of a pixel that counts for the position.
     pub tolerance: f32,
-    /// Of all measures of disparity one in so many rows is looked at.
+    /// Of all measures of disparity one in so many rows is looked at, a divisor of
+    /// 32, and the first of them.
     pub every: usize,
+    pub first: usize,
+    /// Whether the upper part was not matched but followed in the image.
+    pub followed: bool,
     /// What depths are finite.
     pub limits: Depth,
 }
@@ -51,7 +56,7 @@ pub struct Sums {
     /// Over all pixels.
     pub saliency: f64,
     pub max_saliency: f32,
-    /// Over those with disparity in every fourth row, and their number.
+    /// Over those with disparity in the rows that are asked, and their number.
     pub confidence: f64,
     pub asked: f64,
     /// Over those with disparity.
@@ -85,13 +90,14 @@ impl Sums {
         out: &mut Out<'_>,
     ) -> Self {
         let mut sums = Self::default();
+        let asked = (bounds.height() / (ROWS / ASKED)).clamp(1, ASKED);
         for upper in (bounds.y0..bounds.y1).step_by(ROWS) {
             let rows = PixelBox { y0: upper, y1: (upper + ROWS).min(bounds.y1), ..*bounds };
             let at = (upper - bounds.y0) * bounds.width();
             let mask = &mut out.mask[at..at + rows.height() * rows.width()];
             dispatch!(level, simd => {
                 sums.add_mask(simd, id, &rows, ids, source.attention, (mask, out.row));
-                sums.add_confidence(simd, id, &rows, ids, source);
+                sums.add_confidence(simd, id, &rows, ids, source, asked);
                 sums.add(simd, id, &rows, ids, source, centre);
             });
         }
@@ -155,11 +161,12 @@ impl Sums {
         rows: &PixelBox,
         ids: &Image<u32>,
         source: &RegionSource<'_>,
+        every: usize,
     ) {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let own = u32x16::splat(simd, id);
         let [mut sum, mut asked] = [zero; 2];
-        for y in (rows.y0..rows.y1).step_by(ASKED) {
+        for y in (rows.y0..rows.y1).step_by(every) {
             let (ids, d) = (ids.row(y), source.disparity.row(y));
             let confidence = source.confidence.row(y);
             for x in (rows.x0..rows.x1).step_by(LANES) {
@@ -195,7 +202,7 @@ impl Sums {
         let [mut w, mut uw, mut vw] = [zero; 3];
         let lane = f32x16::from_fn(simd, |i| i as f32);
         let depth_scale = source.rig.depth_scale() as f32;
-        for y in (rows.y0..rows.y1).step_by(centre.every) {
+        for y in (rows.y0 + centre.first..rows.y1).step_by(centre.every) {
             let v = f32x16::splat(simd, y as f32 - centre.v);
             let (d_row, id_row) = (source.disparity.row(y), ids.row(y));
             for x in (rows.x0..rows.x1).step_by(LANES) {

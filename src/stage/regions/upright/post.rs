@@ -10,6 +10,7 @@ use crate::image::Image;
 use crate::perception::View;
 use crate::stage::ground::Plane;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
+use crate::stage::standing::column::TALL_M;
 use crate::stage::standing::size_scale;
 
 /// Width of the widest post, metres (of a road scene); a trunk is wider.
@@ -20,10 +21,10 @@ const LEAST_PX: usize = 2;
 const WIDENED_PX: f32 = 4.0;
 /// A post is known at least up to this height, metres: what is lower ends there.
 const LEAST_TOP_M: f32 = 1.9;
-/// It goes on by so much,
+/// It goes on by so much, and as high as nothing else that stands on a road; at the
+/// upper edge of the image so many steps are enough.
 const LEAST_RISE_M: f32 = 1.5;
-/// up to this height: above what people and their cars reach.
-const HIGH_M: f32 = 4.2;
+const LEAST_STEPS: usize = 2;
 /// Rows below the known top in which its sides are looked for.
 const ROWS: usize = 12;
 /// Rows that are followed at once, and by how many pixels it may lean in them.
@@ -96,8 +97,8 @@ impl Posts {
         let upward = (0..bounds.y0.div_ceil(STEP))
             .map(|k| bounds.y0.saturating_sub((k + 1) * STEP)..bounds.y0 - k * STEP);
         let end = band.follow(stump.left, &shaft, upward, up);
-        let rises = height(end) >= (height(bounds.y0) + LEAST_RISE_M).max(HIGH_M);
-        if up.is_empty() || !(rises || end == 0) {
+        let rises = height(end) >= (height(bounds.y0) + LEAST_RISE_M).max(TALL_M);
+        if up.is_empty() || !(rises || end == 0 && up.len() >= LEAST_STEPS) {
             return;
         }
         let downward = (bounds.y0..bounds.y1).step_by(STEP).map(|y| y..(y + STEP).min(bounds.y1));
@@ -337,31 +338,42 @@ mod tests {
 
     /// Candidate 1 in `columns` of a grey image, dark where `dark` says so.
     fn follow(columns: Range<usize>, dark: impl Fn(usize, usize) -> bool) -> Candidates {
+        follow_from(MATCHED.start, columns, dark)
+    }
+
+    /// The same, matched from row `upper` on.
+    fn follow_from(
+        upper: usize,
+        columns: Range<usize>,
+        dark: impl Fn(usize, usize) -> bool,
+    ) -> Candidates {
+        let matched = upper..MATCHED.end;
         let gray = Image::from_fn(SIZE, |x, y| if dark(x, y) { 60 } else { 120 });
         let rgb = Image::from_fn(SIZE, |x, y| [gray.get(x, y), 120, 120]);
         let color = View { rgb, gray: gray.clone(), is_gray: false, ..View::default() };
         let gray = View { gray, is_gray: true, ..View::default() };
-        let [out, same] = [color, gray].map(|left| follow_in(&left, columns.clone()));
+        let [out, same] =
+            [color, gray].map(|left| follow_in(&left, columns.clone(), matched.clone()));
         assert_eq!(out.ids.pixels(), same.ids.pixels());
         out
     }
 
-    fn follow_in(left: &View, columns: Range<usize>) -> Candidates {
+    fn follow_in(left: &View, columns: Range<usize>, matched: Range<usize>) -> Candidates {
         let mut out = Candidates::default();
         // The second frame: the ids of the first one stand.
         out.clear(SIZE, 2);
         out.ids.fill(1);
         out.clear(SIZE, 2);
         assert_eq!(out.first, OWN);
-        for y in MATCHED {
+        for y in matched.clone() {
             out.ids.row_mut(y)[columns.clone()].fill(OWN);
         }
         out.boxes[0] = PixelBox {
             x0: columns.start,
-            y0: MATCHED.start,
+            y0: matched.start,
             x1: columns.end,
-            y1: MATCHED.end,
-            area: columns.len() * MATCHED.len(),
+            y1: matched.end,
+            area: columns.len() * matched.len(),
         };
         // Something else that hides a part of it.
         out.ids.row_mut(30).fill(OWN + 1);
@@ -416,6 +428,15 @@ mod tests {
         ] {
             assert_eq!(area(&out), columns.len() * MATCHED.len());
             assert_eq!(out.followed_of(OWN), 0);
+        }
+    }
+
+    #[test]
+    fn at_the_upper_edge_one_step_shows_no_post() {
+        let post = |x: usize, _: usize| (48..53).contains(&x);
+        for (from, follows) in [(3, false), (7, true)] {
+            let out = follow_from(from, 46..56, post);
+            assert_eq!(out.followed_of(OWN) > 0, follows, "{from}");
         }
     }
 
