@@ -41,7 +41,7 @@ const LEAST_FREE: f32 = 0.3;
 const PLATE_M: f32 = 0.3;
 /// Share of its sides, of so many cells at least, behind which it is farther away.
 const PLATE_FREE: f32 = 0.8;
-const PLATE_SIDES: u32 = 4;
+const PLATE_SIDES: u32 = 6;
 
 /// One thing on the ground.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -112,8 +112,9 @@ impl Thing {
     }
 
     fn is_behind(&self) -> bool {
-        let sides = (self.free + self.hidden).max(1) as f32;
-        (self.free as f32) < LEAST_FREE * sides
+        let sides = self.free + self.hidden;
+        // Far away nothing beside a thing differs enough to tell.
+        if sides == 0 { self.goes_on() } else { (self.free as f32) < LEAST_FREE * sides as f32 }
     }
 }
 

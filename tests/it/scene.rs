@@ -248,6 +248,16 @@ fn what_stands_is_found_and_what_floats_is_counted() {
 }
 
 #[test]
+fn two_cells_are_a_thing_far_away_and_an_edge_nearby() {
+    let car = [-0.9, 0.9, 0.0, 1.1, 32.0];
+    let found = things(&upright(&[car])).list;
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!((found[0].depth_m[0] - 32.0).abs() < 0.5, "{found:?}");
+    // As many cells of a kerb.
+    assert!(things(&upright(&[[-0.9, 0.9, 0.0, 0.4, 10.0]])).list.is_empty());
+}
+
+#[test]
 fn a_sign_on_a_post_that_is_not_seen_is_a_thing_up_to_its_top() {
     let at = |things: &Things, x: f64, height: f64| {
         let (u, v) = (320.0 + F * x / 10.0, HORIZON + F * (HEIGHT - height) / 10.0);
@@ -258,6 +268,11 @@ fn a_sign_on_a_post_that_is_not_seen_is_a_thing_up_to_its_top() {
     assert_eq!((found.list.len(), found.floating), (1, 0));
     assert_eq!((at(&found, 2.0, 2.1), at(&found, 2.0, 2.8)), (1, 1));
     assert_eq!((at(&found, 2.0, 1.6), at(&found, 1.5, 2.4)), (0, 0));
+    // Of one above a van only the lower edge is as low as what is looked for.
+    let (high, van) = ([1.7, 2.3, 2.4, 3.2, 10.0], [0.5, 1.5, 0.0, 2.0, 5.0]);
+    let found = things(&upright(&[high, van]));
+    assert_eq!(found.list.len(), 2, "{:?}", found.list);
+    assert_ne!(at(&found, 2.0, 2.5), 0);
     // One on a wall just behind it is none, and one that something nearer covers at a side.
     let wall = [-3.0, 6.0, 1.5, 3.5, 10.3];
     assert_eq!(at(&things(&upright(&[sign, wall])), 2.0, 2.3), 0);

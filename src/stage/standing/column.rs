@@ -1,7 +1,7 @@
 //! Segments of a column of cells that are one surface above the ground.
 
-use super::centre;
 use super::kinds::{Bits, HIGH_M, Kinds};
+use super::{HIGH, centre};
 use crate::image::Image;
 use crate::simd::Level;
 use crate::stage::ground::Plane;
@@ -17,6 +17,10 @@ const MAX_HOLES: usize = 2;
 /// Cells of a segment, at least: what is shorter is a mixture of two surfaces at
 /// an edge as a rule, or noise. Of streets half of all segments are.
 const LEAST_CELLS: u32 = 3;
+/// Metres from which so many cells are enough: what is far away is no higher than
+/// that, and what two surfaces mix to at an edge is lower.
+const FEW_CELLS: u32 = 2;
+const FEW_M: f32 = 0.6;
 /// Cells above a segment among which the next disparity is looked for.
 const LOOK_UP: usize = 6;
 /// Largest distance of a cell from its segment's mean disparity, in parts: the bonnet
@@ -149,7 +153,7 @@ impl<'a> Column<'a> {
             next = loop {
                 let mut s = self.start(y, contact_m, carried);
                 let end = self.grow(&mut s);
-                if s.cells >= LEAST_CELLS {
+                if self.is_long(&s) {
                     out.push(s);
                 }
                 let Some((above, gap)) = end else { break None };
@@ -161,6 +165,18 @@ impl<'a> Column<'a> {
                 y = above;
             };
         }
+    }
+
+    /// Whether a segment is more than noise.
+    fn is_long(&self, s: &Segment) -> bool {
+        // A plate on a post may hang where only a part of it is low enough.
+        let whole = s.cells + s.upper - s.reach;
+        let row_m = self.plane.a * self.plane.camera_height_m / s.disparity();
+        s.cells >= LEAST_CELLS
+            || (s.top != Top::Tall && whole >= LEAST_CELLS)
+            || (s.contact
+                && s.cells >= FEW_CELLS
+                && (FEW_CELLS as usize * HIGH) as f32 * row_m >= FEW_M)
     }
 
     /// A segment of one cell.
