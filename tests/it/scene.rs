@@ -195,6 +195,18 @@ fn what_is_seen_between_two_things_parts_them() {
 }
 
 #[test]
+fn what_is_seen_on_both_sides_of_something_nearer_is_one() {
+    let person = [-0.3, 0.3, 0.0, 1.8, 8.0];
+    let left = [-2.0, 0.0, 0.0, 1.5, 10.0];
+    let right = |distance| [0.0, 2.0, 0.0, 1.5, distance];
+    assert_eq!(things(&upright(&[left, right(10.0), person])).list.len(), 2);
+    // Not what is farther away there, or wider apart than a person.
+    assert_eq!(things(&upright(&[left, right(10.3), person])).list.len(), 3);
+    let van = [-0.8, 0.8, 0.0, 1.8, 8.0];
+    assert_eq!(things(&upright(&[left, right(10.0), van])).list.len(), 3);
+}
+
+#[test]
 fn the_side_of_a_car_that_recedes_is_a_part_of_it() {
     // Seen from behind: its rear at 8 m, its side beside the axis up to 14 m.
     let (side, rear, front) = (1.9, 8.0, 14.0);

@@ -10,7 +10,11 @@ use crate::stage::regions::union_find::UnionFind;
 /// Gap in metres across which segments beside each other are one thing, if
 /// nothing is seen through it.
 const GAP_M: f32 = 0.4;
-/// Share of a segment's height over which a gap beside it shows what is behind.
+/// The same where something nearer hides what is between, as wide as a person who
+/// walks; then their depths may differ by this much, metres.
+const HIDDEN_GAP_M: f32 = 1.2;
+const HIDDEN_STEP_M: f32 = 0.15;
+/// Share of a segment's height over which a gap beside it shows what is behind or before.
 const SEE_THROUGH: f32 = 0.5;
 /// Columns joined after which no further ones are asked: those have been.
 const ENOUGH: usize = 2;
@@ -83,20 +87,30 @@ impl Join {
     fn beside(&mut self, disparity: &Image<f32>, columns: &Columns, view: &View) {
         for place in &self.strong_places {
             let column = place.x as usize;
-            let reach = view.columns(GAP_M, place);
-            let mut looked = 0;
-            for x in (column.saturating_sub(reach)..column).rev() {
+            let s = &columns.segments[place.segment as usize];
+            let [gap, hidden_gap] = [GAP_M, HIDDEN_GAP_M].map(|gap| view.columns(gap, place));
+            let (mut looked, mut hidden) = (0, 0);
+            for x in (column.saturating_sub(hidden_gap)..column).rev() {
+                let near = column - x <= gap;
                 let others = self.first_strong[x] as usize..self.first_strong[x + 1] as usize;
                 let mut joined = false;
                 for other in &self.strong_places[others] {
-                    if view.beside(place, other) {
+                    if (near || view.is_as_deep(place, other)) && view.beside(place, other) {
                         self.sets.union(other.segment, place.segment);
                         joined = true;
                     }
                 }
                 looked += usize::from(joined);
-                let s = &columns.segments[place.segment as usize];
-                if looked == ENOUGH || (!joined && seen_through(disparity, x, s)) {
+                if looked == ENOUGH {
+                    break;
+                }
+                if joined {
+                    continue;
+                }
+                let [farther, nearer] = beyond(disparity, x, s);
+                hidden += usize::from(nearer);
+                // What was not measured, or is hidden only in part, may be a small gap.
+                if farther || !near && column - x - hidden > gap {
                     break;
                 }
             }
@@ -173,12 +187,19 @@ impl Join {
     }
 }
 
-/// Whether column `x` shows over most of the height of a segment what is behind it.
-fn seen_through(disparity: &Image<f32>, x: usize, s: &Segment) -> bool {
+/// Whether column `x` shows over most of the height of a segment something farther,
+/// and whether something nearer.
+fn beyond(disparity: &Image<f32>, x: usize, s: &Segment) -> [bool; 2] {
     let d = s.disparity();
-    let limit = d - tolerance(d);
-    let behind = (s.upper..s.lower).filter(|&y| disparity.get(x, y as usize) < limit).count();
-    behind as f32 > SEE_THROUGH * (s.lower - s.upper) as f32
+    let (least, most) = (d - tolerance(d), d + tolerance(d));
+    let (mut farther, mut nearer) = (0, 0);
+    for y in s.upper as usize..s.lower as usize {
+        // NaN is neither.
+        let other = disparity.get(x, y);
+        farther += u32::from(other < least);
+        nearer += u32::from(other > most);
+    }
+    [farther, nearer].map(|rows| rows as f32 > SEE_THROUGH * (s.lower - s.upper) as f32)
 }
 
 /// Where a segment is.
@@ -243,6 +264,11 @@ impl View {
         let recedes = us * ut > 0.0 && (us.abs() < ut.abs()) == (zs > zt);
         recedes
             && step <= most + (near * ((us / ut).max(ut / us) - 1.0)).min(LONGEST_M * self.scale)
+    }
+
+    /// Whether segments with something nearer between them may be one surface.
+    fn is_as_deep(&self, s: &Place, t: &Place) -> bool {
+        (s.distance - t.distance).abs() <= HIDDEN_STEP_M * self.scale
     }
 
     /// Columns from the principal point, pixels.
