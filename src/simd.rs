@@ -43,6 +43,18 @@ pub fn available() -> Vec<Level> {
     levels
 }
 
+/// The values from `at` on; `beyond` where the row has ended.
+#[inline(always)]
+pub(crate) fn padded<T: Copy, const N: usize>(row: &[T], at: usize, beyond: T) -> [T; N] {
+    let row = &row[at.min(row.len())..];
+    if let Some(values) = row.first_chunk() {
+        return *values;
+    }
+    let mut values = [beyond; N];
+    values[..row.len()].copy_from_slice(row);
+    values
+}
+
 /// The 32 bytes from `at`.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(simd: S, bytes: &[u8], at: usize) -> u8x32<S> {

@@ -1,8 +1,8 @@
 //! Things that stand on the ground: column segments joined in bird's-eye view.
 
+pub mod climb;
 pub mod column;
 pub mod join;
-pub mod kinds;
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};

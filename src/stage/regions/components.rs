@@ -5,10 +5,10 @@ use super::union_find::UnionFind;
 use crate::image::{Image, Size};
 
 /// Disparity difference in pixels that is noise at any distance.
-const TOLERANCE_PX: f32 = 0.7;
+pub const TOLERANCE_PX: f32 = 0.7;
 /// Disparity difference in parts of the disparity that one surface may have
 /// from a pixel to the next.
-const TOLERANCE_PART: f32 = 0.05;
+pub const TOLERANCE_PART: f32 = 0.05;
 /// A salient pixel that no component has reached yet.
 const PENDING: u32 = Candidates::NEVER;
 

@@ -215,11 +215,6 @@ fn compare_row<S: Simd>(simd: S, values: &[f32], threshold: f32, words: &mut [u6
     }
 }
 
-/// Whether bit `at` of some words is set.
-pub fn is_set(words: &[u64], at: usize) -> bool {
-    words[at / WORD] >> (at % WORD) & 1 == 1
-}
-
 /// The first set bit from bit `from` on.
 pub fn first_set(words: &[u64], from: usize) -> Option<usize> {
     let mut index = from / WORD;
@@ -284,6 +279,5 @@ mod tests {
         assert_eq!(last_set(&words, 192), Some(133));
         assert_eq!(last_set(&words, 133), Some(63));
         assert_eq!(last_set(&words, 63), None);
-        assert!(is_set(&words, 133) && !is_set(&words, 132));
     }
 }

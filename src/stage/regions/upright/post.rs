@@ -10,7 +10,7 @@ use crate::image::Image;
 use crate::perception::View;
 use crate::stage::ground::Plane;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
-use crate::stage::standing::column::TALL_M;
+use crate::stage::standing::climb::TALL_M;
 use crate::stage::standing::size_scale;
 
 /// Width of the widest post, metres (of a road scene); a trunk is wider.
