@@ -3,14 +3,16 @@
 pub mod climb;
 pub mod column;
 pub mod join;
+mod sides;
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
-use crate::simd::Level;
+use crate::simd::{Level, dispatch};
 use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
 use column::{Columns, Segment, Top};
 use join::Join;
+use sides::sides;
 
 /// Pixels that a cell is wide: poles, legs and the gaps between things are narrow.
 pub const WIDE: usize = 2;
@@ -28,8 +30,6 @@ const LEAST_RISE: f32 = 0.1;
 const LEAST_CONTACT: f32 = 0.3;
 /// Share of a thing's cells that its box leaves out on every side.
 const TRIM: f32 = 0.04;
-/// Cells beside a thing in which its background is looked for.
-const LOOK_ASIDE: usize = 6;
 /// Cells across a pole, at most.
 const MOST_WIDE: usize = 6;
 /// Share of a thing's sides that must be free of anything nearer.
@@ -137,6 +137,7 @@ pub struct Things {
 /// The finder of things that stand, with its buffers.
 #[derive(Debug)]
 pub struct Standing {
+    level: Level,
     columns: Columns,
     join: Join,
     thing: Vec<u32>,
@@ -149,6 +150,7 @@ impl Standing {
     /// The finder with instructions of `level`.
     pub fn new(level: Level) -> Self {
         Self {
+            level,
             columns: Columns::new(level),
             join: Join::default(),
             thing: Vec::new(),
@@ -253,14 +255,17 @@ impl Standing {
             let asked = thing.is_large(scale, least_cells) && stands;
             u32::from(asked && !thing.is_building())
         }));
-        for (s, &thing) in self.columns.segments.iter().zip(&self.thing) {
-            let index = thing as usize - 1;
-            if self.seen[index] != 0 {
-                let [free, hidden] = sides(disparity, s);
-                things[index].free += free;
-                things[index].hidden += hidden;
+        let Self { level, columns, thing, seen, .. } = self;
+        dispatch!(*level, simd => {
+            for (s, &thing) in columns.segments.iter().zip(&*thing) {
+                let index = thing as usize - 1;
+                if seen[index] != 0 {
+                    let [free, hidden] = sides(simd, disparity, s);
+                    things[index].free += free;
+                    things[index].hidden += hidden;
+                }
             }
-        }
+        });
     }
 
     /// Writes the cells of each thing, less its outermost ones.
@@ -351,24 +356,6 @@ pub fn cells(size: Size) -> Size {
 #[inline]
 pub fn centre(x: usize, y: usize) -> (f32, f32) {
     ((x * WIDE) as f32 + (WIDE as f32 - 1.0) / 2.0, (y * HIGH) as f32 + (HIGH as f32 - 1.0) / 2.0)
-}
-
-/// How many cells to the left and to the right of a segment are farther than
-/// it, and how many are nearer.
-fn sides(disparity: &Image<f32>, s: &Segment) -> [u32; 2] {
-    let (x, d) = (s.x as usize, s.disparity());
-    let mut counts = [0, 0];
-    for y in s.upper as usize..s.lower as usize {
-        let row = disparity.row(y);
-        let left = (1..=LOOK_ASIDE).filter_map(|k| row.get(x.wrapping_sub(k)));
-        let right = (1..=LOOK_ASIDE).filter_map(|k| row.get(x + k));
-        for near in [left.copied().find(|d| !d.is_nan()), right.copied().find(|d| !d.is_nan())] {
-            if let Some(near) = near.filter(|near| !agree(*near, d)) {
-                counts[usize::from(near > d)] += 1;
-            }
-        }
-    }
-    counts
 }
 
 /// Columns of cells around a segment that have its disparity in row `y`, no
