@@ -45,13 +45,18 @@ pub fn available() -> Vec<Level> {
 
 /// The values from `at` on; `beyond` where the row has ended.
 #[inline(always)]
-pub(crate) fn padded<T: Copy, const N: usize>(row: &[T], at: usize, beyond: T) -> [T; N] {
+pub(crate) fn padded<S: Simd, V: SimdBase<S>>(
+    simd: S,
+    row: &[V::Element],
+    at: usize,
+    beyond: V::Element,
+) -> V {
     let row = &row[at.min(row.len())..];
-    if let Some(values) = row.first_chunk() {
-        return *values;
+    if row.len() >= V::LEN {
+        return V::from_slice(simd, &row[..V::LEN]);
     }
-    let mut values = [beyond; N];
-    values[..row.len()].copy_from_slice(row);
+    let mut values = V::splat(simd, beyond);
+    values.as_mut_slice()[..row.len()].copy_from_slice(row);
     values
 }
 

@@ -2,7 +2,7 @@
 
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, u32x16};
 use crate::stage::saliency::PreviousFrame;
 use crate::stage::saliency::flow::Flow;
 
@@ -106,28 +106,17 @@ fn smooth<S: Simd>(
     let size = attention.size();
     for y in 0..size.height {
         for x in (0..size.width).step_by(LANES) {
-            let (dx, dy) = (load(simd, flow.dx.row(y), x), load(simd, flow.dy.row(y), x));
-            let trust = load(simd, flow.trust.row(y), x);
+            let dx: f32x16<S> = padded(simd, flow.dx.row(y), x, 0.0);
+            let dy: f32x16<S> = padded(simd, flow.dy.row(y), x, 0.0);
+            let trust: f32x16<S> = padded(simd, flow.trust.row(y), x, 0.0);
             let here = f32x16::from_fn(simd, |i| (x + i) as f32);
             let place = Place::new(size, here + dx, dy + y as f32);
-            let now = load(simd, attention.row(y), x);
+            let now: f32x16<S> = padded(simd, attention.row(y), x, 0.0);
             let [past, attended] = place.of(simd, past);
             store(attention.row_mut(y), x, now + trust * share * (past - now));
             store(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
         }
     }
-}
-
-/// The values of a row from `x` on; beyond its end 0.
-#[inline(always)]
-fn load<S: Simd>(simd: S, row: &[f32], x: usize) -> f32x16<S> {
-    let row = &row[x..];
-    if let Some(values) = row.first_chunk::<LANES>() {
-        return f32x16::from_slice(simd, values);
-    }
-    let mut values = [0.0; LANES];
-    values[..row.len()].copy_from_slice(row);
-    f32x16::from_slice(simd, &values)
 }
 
 /// Writes those of the values from `x` on that are inside a row.

@@ -101,8 +101,7 @@ pub fn climb<S: Simd>(
     let lane = f32x16::from_fn(simd, |i| (i * WIDE) as f32);
     let slope = (lane + centre(x, 0).0) * plane.b;
     for y in (0..disparity.height()).rev() {
-        let d: [f32; LANES] = padded(disparity.row(y), x, f32::NAN);
-        let d = f32x16::from_slice(simd, &d);
+        let d: f32x16<S> = padded(simd, disparity.row(y), x, f32::NAN);
         let known = d.simd_gt(LEAST_DISPARITY);
         if known.any_true() {
             // As `Plane::height` reckons.

@@ -1,7 +1,7 @@
 //! Sums over the pixels of one region, sixteen at a time.
 
 use crate::image::Image;
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, u32x16};
 use crate::stage::coarse::CELL;
 use crate::stage::depth::Depth;
 use crate::stage::regions::RegionSource;
@@ -128,19 +128,19 @@ impl Sums {
             Rows::at(attention, y).spread(simd, cells.clone(), row);
             for (x, mask) in (rows.x0..).step_by(LANES).zip(mask.chunks_mut(LANES)) {
                 // Beyond the box there is no pixel of this id.
-                let at = load(ids, x);
+                let at: u32x16<S> = padded(simd, ids, x, 0);
                 if let Some(mask) = mask.first_chunk_mut::<LANES>() {
                     for i in 0..LANES {
-                        mask[i] = if at[i] == id { 255 } else { 0 };
+                        mask[i] = if at.as_slice()[i] == id { 255 } else { 0 };
                     }
                 } else {
-                    for (mask, at) in mask.iter_mut().zip(at) {
-                        *mask = if at == id { 255 } else { 0 };
+                    for (mask, at) in mask.iter_mut().zip(at.as_slice()) {
+                        *mask = if *at == id { 255 } else { 0 };
                     }
                 }
-                let inside = u32x16::from_slice(simd, &at).simd_eq(own);
+                let inside = at.simd_eq(own);
                 area += inside.to_bitmask().count_ones();
-                let s = inside.select(f32x16::from_slice(simd, &load(row, x)), zero);
+                let s = inside.select(padded(simd, row, x, 0.0), zero);
                 sum += s;
                 most = most.max(s);
             }
@@ -170,10 +170,11 @@ impl Sums {
             let (ids, d) = (ids.row(y), source.disparity.row(y));
             let confidence = source.confidence.row(y);
             for x in (rows.x0..rows.x1).step_by(LANES) {
-                let inside = u32x16::from_slice(simd, &load(ids, x)).simd_eq(own);
-                let d = f32x16::from_slice(simd, &load(d, x));
+                let at: u32x16<S> = padded(simd, ids, x, 0);
+                let inside = at.simd_eq(own);
+                let d: f32x16<S> = padded(simd, d, x, 0.0);
                 let known = inside & d.simd_eq(d);
-                sum += known.select(f32x16::from_slice(simd, &load(confidence, x)), zero);
+                sum += known.select(padded(simd, confidence, x, 0.0), zero);
                 asked += known.select(one, zero);
             }
         }
@@ -206,11 +207,12 @@ impl Sums {
             let v = f32x16::splat(simd, y as f32 - centre.v);
             let (d_row, id_row) = (source.disparity.row(y), ids.row(y));
             for x in (rows.x0..rows.x1).step_by(LANES) {
-                let inside = u32x16::from_slice(simd, &load(id_row, x)).simd_eq(own);
+                let at: u32x16<S> = padded(simd, id_row, x, 0);
+                let inside = at.simd_eq(own);
                 if inside.to_bitmask() == 0 {
                     continue;
                 }
-                let d = f32x16::from_slice(simd, &load(d_row, x));
+                let d: f32x16<S> = padded(simd, d_row, x, 0.0);
                 let z = centre.limits.of_lanes(simd, d, depth_scale);
                 looked += inside.select(one, zero);
 
@@ -254,17 +256,6 @@ impl Sums {
         add(&mut self.place[2], [e1, e2]);
         add(&mut self.weighted, [w, uw, vw]);
     }
-}
-
-/// The values from column `x` on; zeros beyond the end of the row.
-#[inline(always)]
-fn load<T: Copy + Default>(row: &[T], x: usize) -> [T; LANES] {
-    if let Some(values) = row[x..].first_chunk() {
-        return *values;
-    }
-    let mut values = [T::default(); LANES];
-    values[..row.len() - x].copy_from_slice(&row[x..]);
-    values
 }
 
 #[inline(always)]

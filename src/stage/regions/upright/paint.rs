@@ -1,6 +1,6 @@
 //! From cells to pixels: the things' own outlines.
 
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u8x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, u8x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
@@ -191,14 +191,14 @@ impl Painter {
                 for y in rows.clone() {
                     // What does not rise above the ground is none of the thing.
                     let ground = slope + plane.a * y as f32 + plane.c + GROUND_PX;
-                    let d = f32x16::from_slice(simd, &load(source.disparity.row(y), x, f32::NAN));
+                    let d: f32x16<S> = padded(simd, source.disparity.row(y), x, f32::NAN);
                     let on = (d - surface).abs().simd_le(tolerance) & d.simd_gt(ground);
                     let mut bits = on.to_bitmask() & all;
                     let holes = !d.simd_eq(d).to_bitmask() & own & all;
                     if holes != 0 {
-                        let matched = load(source.roi.matched.row(y), x, 0);
+                        let matched: u8x16<S> = padded(simd, source.roi.matched.row(y), x, 0);
                         let zero = u8x16::splat(simd, 0);
-                        let none = u8x16::from_slice(simd, &matched).simd_eq(zero).to_bitmask();
+                        let none = matched.simd_eq(zero).to_bitmask();
                         // The left pixel of a cell tells.
                         bits |= holes & (inside | ((none & LEFT) * CELL_BITS));
                     }
@@ -209,18 +209,6 @@ impl Painter {
             out.boxes[id as usize - 1].join(&painted);
         }
     }
-}
-
-/// The values from `x` on; `beyond` where the row has ended.
-#[inline(always)]
-fn load<T: Copy>(row: &[T], x: usize, beyond: T) -> [T; LANES] {
-    let row = &row[x..];
-    if let Some(values) = row.first_chunk() {
-        return *values;
-    }
-    let mut values = [beyond; LANES];
-    values[..row.len()].copy_from_slice(row);
-    values
 }
 
 /// Writes `id` where bits are set and 0 elsewhere: what is to the right comes later.

@@ -1,7 +1,7 @@
 //! From pixels to cells: the median disparity of each.
 
 use crate::image::Image;
-use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, prelude::*, u8x32};
+use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, padded, prelude::*, u8x32};
 use crate::stage::coarse::CELL;
 use crate::stage::regions::RegionSource;
 use crate::stage::roi::bits::BitMask;
@@ -57,11 +57,11 @@ impl Row<'_> {
         for (i, map) in map.chunks_mut(LANES).enumerate() {
             let x = i * PIXELS;
             // What was not matched finely is known coarsely.
-            let coarse: [f32; LANES] = group(self.coarse, i * COARSE, f32::NAN);
-            let coarse = f32x16::from_slice(simd, &coarse) - self.offset;
+            let coarse: f32x16<S> = padded(simd, self.coarse, i * COARSE, f32::NAN);
+            let coarse = coarse - self.offset;
             let mut values = coarse.zip_low(coarse);
             let [upper, lower] = self.matched;
-            let matched = cells_of(simd, group(upper, x, 0), group(lower, x, 0));
+            let matched = cells_of(simd, padded(simd, upper, x, 0), padded(simd, lower, x, 0));
             if matched != 0 {
                 let medians = medians_of(simd, &self.disparity, x);
                 let known = medians.simd_eq(medians).to_bitmask() & matched;
@@ -79,8 +79,8 @@ impl Row<'_> {
 
 /// One bit for each cell of which a pixel of one of two rows is not 0.
 #[inline(always)]
-fn cells_of<S: Simd>(simd: S, upper: [u8; PIXELS], lower: [u8; PIXELS]) -> u64 {
-    let any = u8x32::from_slice(simd, &upper) | u8x32::from_slice(simd, &lower);
+fn cells_of<S: Simd>(simd: S, upper: u8x32<S>, lower: u8x32<S>) -> u64 {
+    let any = upper | lower;
     let bits = !any.simd_eq(u8x32::splat(simd, 0)).to_bitmask();
     // The even bits move together.
     let mut bits = (bits | bits >> 1) & 0x5555_5555;
@@ -88,18 +88,6 @@ fn cells_of<S: Simd>(simd: S, upper: [u8; PIXELS], lower: [u8; PIXELS]) -> u64 {
     bits = (bits | bits >> 2) & 0x0f0f_0f0f;
     bits = (bits | bits >> 4) & 0x00ff_00ff;
     (bits | bits >> 8) & 0xffff
-}
-
-/// The values from `at` on; `beyond` where the row has ended.
-#[inline(always)]
-fn group<T: Copy, const N: usize>(row: &[T], at: usize, beyond: T) -> [T; N] {
-    let row = &row[at.min(row.len())..];
-    if let Some(values) = row.first_chunk() {
-        return *values;
-    }
-    let mut values = [beyond; N];
-    values[..row.len()].copy_from_slice(row);
-    values
 }
 
 /// Median disparity of some of the pixels of each of several cells, whose rows
@@ -112,9 +100,9 @@ fn medians_of<S: Simd>(simd: S, rows: &[&[f32]; HIGH], from: usize) -> f32x16<S>
     let mut n = zero;
     for (sample, (dx, dy)) in sorted.iter_mut().zip(SAMPLES) {
         // The last column goes on beyond the edge.
-        let pixels: [f32; PIXELS] = group(rows[dy], from, rows[dy][rows[dy].len() - 1]);
-        let (left, right) = pixels.split_at(LANES);
-        let (left, right) = (f32x16::from_slice(simd, left), f32x16::from_slice(simd, right));
+        let (row, last) = (rows[dy], rows[dy][rows[dy].len() - 1]);
+        let left: f32x16<S> = padded(simd, row, from, last);
+        let right: f32x16<S> = padded(simd, row, from + LANES, last);
         let d = if dx == 0 { left.unzip_low(right) } else { left.unzip_high(right) };
         // Holes go to the end.
         let known = d.simd_eq(d);
