@@ -17,7 +17,7 @@ use salient_stereo::stage::coarse::{Coarse, CoarseDisparity};
 use salient_stereo::stage::preprocess::Preprocess;
 use salient_stereo::stage::refine::Refine;
 use salient_stereo::stage::roi::Roi;
-use salient_stereo::stage::saliency::{Previous, Saliency, Scene as SaliencyScene};
+use salient_stereo::stage::saliency::{Previous, Saliency, Scene as SaliencyScene, upsample};
 use salient_stereo::stage::stereo::{Matches, Stereo};
 
 const SIZE: Size = Size::new(1242, 375);
@@ -35,7 +35,8 @@ struct Scene {
     right: View,
     truth: Truth,
     roi: RoiMask,
-    saliency: Image<f32>,
+    /// One value per cell.
+    attention: Image<f32>,
     coarse: CoarseDisparity,
     matches: Matches,
 }
@@ -63,7 +64,7 @@ impl Scene {
             right,
             truth: truth.unwrap(),
             roi: RoiMask { salient: mask.clone(), matched: mask, fraction: fraction as f32 },
-            saliency: Image::filled(SIZE, 1.0),
+            attention: Image::filled(SIZE.divided_by(4), 1.0),
             coarse: CoarseDisparity::default(),
             matches: Matches::default(),
         };
@@ -88,7 +89,7 @@ impl Scene {
                 &self.perception.left,
                 &self.right,
                 &self.roi,
-                &self.saliency,
+                &self.attention,
                 &self.coarse,
                 &mut self.matches,
             );
@@ -110,12 +111,12 @@ impl Scene {
     /// The second of two frames of a camera that stands still.
     fn attention(&mut self) -> impl FnMut() + '_ {
         let mut stage = Saliency::new(&self.config, SIZE, simd::detect());
-        let (mut previous, mut cells) = (Previous::default(), Image::default());
-        let Self { perception, coarse, saliency, .. } = self;
+        let mut previous = Previous::default();
+        let Self { perception, coarse, attention, .. } = self;
         let mut run = move || {
             let Perception { stamp, left, rig, .. } = &*perception;
             let scene = SaliencyScene { stamp: *stamp, left, coarse, rig };
-            stage.run(&scene, &mut previous, &mut cells, saliency);
+            stage.run(&scene, &mut previous, attention);
         };
         run();
         run
@@ -124,19 +125,18 @@ impl Scene {
     fn region_of_interest(&mut self) -> impl FnMut() + '_ {
         drop(self.attention());
         self.check_attention();
-        let cells = Image::from_fn(SIZE.divided_by(4), |x, y| {
-            self.saliency.get((4 * x + 1).min(SIZE.width - 1), (4 * y + 1).min(SIZE.height - 1))
-        });
         let mut stage = Roi::new(&self.config, SIZE, simd::detect());
-        let Self { perception, coarse, saliency, roi, .. } = self;
-        move || stage.run(&cells, saliency, coarse, &perception.rig, roi)
+        let Self { perception, coarse, attention, roi, .. } = self;
+        move || stage.run(attention, coarse, &perception.rig, roi)
     }
 
     /// True objects are more salient than the rest by far.
     fn check_attention(&self) {
         let (mut sums, mut counts) = ([0.0; 2], [0.0; 2]);
         let objects = self.truth.objects.as_ref().unwrap();
-        for (&s, &id) in self.saliency.pixels().iter().zip(objects.pixels()) {
+        let mut saliency = Image::default();
+        upsample(simd::detect(), &self.attention, SIZE, &mut saliency);
+        for (&s, &id) in saliency.pixels().iter().zip(objects.pixels()) {
             sums[usize::from(id != 0)] += f64::from(s);
             counts[usize::from(id != 0)] += 1.0;
         }

@@ -10,7 +10,10 @@ pub use time::{Clock, Stage, StageTimes};
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Picture, Size};
+use crate::simd;
+use crate::stage::coarse::CELL;
 use crate::stage::ground::GroundState;
+use crate::stage::saliency::upsample;
 use crate::stamp::Stamp;
 
 /// Sub-pixel step of [`Perception::disparity`] in pixels.
@@ -72,12 +75,13 @@ pub struct Perception {
     pub frame_id: Arc<str>,
     /// Calibration of the processed (rectified, possibly scaled) views.
     pub rig: Arc<StereoRig>,
-    /// The left view as processed: every image below has its size.
+    /// The left view as processed: every image below but the attention map has its size.
     pub left: View,
     /// Whether attention reckons with a ground plane.
     pub ground: GroundState,
-    /// Attention map S of eq. 4, 0..=1.
-    pub saliency: Image<f32>,
+    /// Attention map S of eq. 4, 0..=1, one value per cell of [`CELL`] pixels; those of
+    /// pixels are [`Perception::saliency`].
+    pub attention: Image<f32>,
     /// Region of interest.
     pub roi: RoiMask,
     /// Disparity `d = x_l - x_r - (cx_l - cx_r)` in pixels, in steps of
@@ -117,7 +121,7 @@ impl Perception {
                 gradient: Image::new(size),
             },
             ground: GroundState::default(),
-            saliency: Image::new(size),
+            attention: Image::new(size.divided_by(CELL)),
             roi: RoiMask { salient: Image::new(size), matched: Image::new(size), fraction: 0.0 },
             disparity: Image::filled(size, f32::NAN),
             confidence: Image::new(size),
@@ -129,5 +133,13 @@ impl Perception {
             max_disparity: 0.0,
             times: StageTimes::default(),
         }
+    }
+
+    /// Attention map S of eq. 4 at every pixel, 0..=1: made from
+    /// [`Perception::attention`] whenever it is asked for, as no stage needs it.
+    pub fn saliency(&self) -> Image<f32> {
+        let mut map = Image::default();
+        upsample(simd::detect(), &self.attention, self.left.gray.size(), &mut map);
+        map
     }
 }

@@ -1,7 +1,7 @@
 //! The method, frame by frame.
 
 use crate::config::Config;
-use crate::image::{Image, Size};
+use crate::image::Size;
 use crate::perception::{Clock, Perception, Stage, StageTimes, StereoFrame, View};
 use crate::simd::Level;
 use crate::stage::coarse::{Coarse, CoarseDisparity};
@@ -38,7 +38,6 @@ pub struct Pipeline {
 
     right: View,
     coarse_disparity: CoarseDisparity,
-    attention: Image<f32>,
     matches: Matches,
     /// Smallest and largest disparity searched, `x_l - x_r` in pixels.
     searched: [f32; 2],
@@ -64,7 +63,6 @@ impl Pipeline {
             latency: Latency::new(config.max_latency),
             right: View::default(),
             coarse_disparity: CoarseDisparity::default(),
-            attention: Image::default(),
             matches: Matches::default(),
             searched: [
                 config.stereo.min_disparity as f32,
@@ -142,19 +140,13 @@ impl Pipeline {
             coarse: &self.coarse_disparity,
             rig: &out.rig,
         };
-        self.saliency.run(&scene, &mut self.previous, &mut self.attention, &mut out.saliency);
+        self.saliency.run(&scene, &mut self.previous, &mut out.attention);
         let footing = self.saliency.footing().unwrap_or_default();
         out.ground = footing.state;
         lap.mark(&mut out.times, Stage::Saliency);
 
         self.roi.set_allowance(self.latency.allowance(lap.total_ms));
-        self.roi.run(
-            &self.attention,
-            &out.saliency,
-            &self.coarse_disparity,
-            &out.rig,
-            &mut out.roi,
-        );
+        self.roi.run(&out.attention, &self.coarse_disparity, &out.rig, &mut out.roi);
         lap.mark(&mut out.times, Stage::Roi);
         let before_matching_ms = lap.total_ms;
 
@@ -162,7 +154,7 @@ impl Pipeline {
             &out.left,
             &self.right,
             &out.roi,
-            &out.saliency,
+            &out.attention,
             &self.coarse_disparity,
             &mut self.matches,
         );
@@ -176,7 +168,7 @@ impl Pipeline {
 
         let source = RegionSource {
             left: &out.left,
-            attention: &self.attention,
+            attention: &out.attention,
             roi: &out.roi,
             disparity: &out.disparity,
             coarse: &self.coarse_disparity,
@@ -223,7 +215,7 @@ mod tests {
 
     use super::*;
     use crate::camera::{Camera, StereoRig};
-    use crate::image::Picture;
+    use crate::image::{Image, Picture};
     use crate::stamp::Stamp;
 
     #[test]

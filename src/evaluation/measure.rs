@@ -178,8 +178,9 @@ impl Trial {
         self.times.offer(Stage::ALL.map(|stage| perception.times.get(stage)));
         part.matched.add(f64::from(perception.roi.fraction));
 
-        self.map.resize(perception.saliency.size());
-        for (byte, s) in self.map.pixels_mut().iter_mut().zip(perception.saliency.pixels()) {
+        let saliency = perception.saliency();
+        self.map.resize(saliency.size());
+        for (byte, s) in self.map.pixels_mut().iter_mut().zip(saliency.pixels()) {
             *byte = (s.clamp(0.0, 1.0) * 255.0).round() as u8;
         }
         truth.fit(observation.truth.as_ref(), perception.labels.size());

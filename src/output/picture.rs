@@ -65,7 +65,7 @@ pub fn depth(perception: &Perception, scale: &Scale, out: &mut Image<[u8; 3]>) {
 /// The attention map as heat over the dimmed gray view.
 pub fn saliency(perception: &Perception, out: &mut Image<[u8; 3]>) {
     let table = Colormap::Inferno.table();
-    paint(&perception.saliency, out, |s| table[(unit(s) * 255.0) as usize]);
+    paint(&perception.saliency(), out, |s| table[(unit(s) * 255.0) as usize]);
     for (pixel, &gray) in out.pixels_mut().iter_mut().zip(perception.left.gray.pixels()) {
         *pixel = pixel.map(|c| ((u16::from(c) * 3 + u16::from(gray)) / 4) as u8);
     }

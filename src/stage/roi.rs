@@ -82,7 +82,8 @@ impl Roi {
         self.allowance = fraction;
     }
 
-    /// The mask from the attention map: `attention` per cell, `saliency` per pixel.
+    /// The mask from `attention` per cell; S at a pixel is what
+    /// [`upsample`](super::saliency::upsample) makes of it.
     ///
     /// `salient` is S >= τ where `depth.min` <= Z <= `depth.max` by the coarse disparity
     /// (cells without one pass), opened and closed, less components smaller
@@ -92,7 +93,6 @@ impl Roi {
     pub fn run(
         &mut self,
         attention: &Image<f32>,
-        saliency: &Image<f32>,
         coarse: &CoarseDisparity,
         rig: &StereoRig,
         out: &mut RoiMask,
@@ -106,7 +106,7 @@ impl Roi {
             self.area = self.matched.count();
         } else {
             let threshold = self.threshold.unwrap_or_else(|| otsu(attention));
-            self.salient.set_from(self.level, saliency, threshold);
+            self.salient.set_from_cells(self.level, attention, self.size, threshold);
             self.gate_depth(coarse, rig);
             self.salient.open(OPENING);
             self.salient.close(CLOSING);

@@ -2,7 +2,7 @@
 //!
 //! All attention work is done at one value per cell of [`CELL`] pixels; a
 //! quarter-size view of the left image is made once per frame and shared by
-//! every cue. The map is smoothed over time and brought to full size at the end.
+//! every cue. The map is smoothed over time at the end.
 
 pub mod barrier;
 pub mod beside;
@@ -177,21 +177,12 @@ impl Saliency {
         }
     }
 
-    /// Writes S, 0..=1, per cell of [`CELL`] pixels into `attention` and for
-    /// every pixel into `saliency`.
-    pub fn run(
-        &mut self,
-        scene: &Scene<'_>,
-        previous: &mut Previous,
-        attention: &mut Image<f32>,
-        saliency: &mut Image<f32>,
-    ) {
+    /// Writes S, 0..=1, per cell of [`CELL`] pixels; [`upsample`] spreads it over pixels.
+    pub fn run(&mut self, scene: &Scene<'_>, previous: &mut Previous, attention: &mut Image<f32>) {
         let cells = self.size.divided_by(CELL);
         attention.resize(cells);
-        saliency.resize(self.size);
         if matches!(self.mode, Mode::FullFrame) {
             attention.fill(1.0);
-            saliency.fill(1.0);
             return;
         }
         shrink_view(self.level, scene.left, &mut self.cells);
@@ -236,6 +227,5 @@ impl Saliency {
             mode.even_contrast(attention);
         }
         self.persistence.stay(attention, &mut previous.frame.attended);
-        upsample(self.level, attention, self.size, saliency);
     }
 }

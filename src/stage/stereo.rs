@@ -15,6 +15,7 @@ use crate::image::{Image, Size};
 use crate::perception::{RoiMask, View};
 use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
+use crate::stage::saliency::upsample;
 use crate::stage::stereo::block::Measure;
 use crate::stage::stereo::cost::Penalties;
 use crate::stage::stereo::engine::{Engine, Method, Settings, Views};
@@ -42,6 +43,9 @@ pub struct Stereo {
     engine: Engine,
     plan: Plan,
     lambda: f32,
+    level: Level,
+    /// S per pixel, where it is asked for.
+    saliency: Image<f32>,
     weight: Image<u8>,
 }
 
@@ -69,17 +73,20 @@ impl Stereo {
             engine: Engine::new(settings, level),
             plan: Plan::default(),
             lambda: stereo.saliency_weight as f32,
+            level,
+            saliency: Image::default(),
             weight: Image::default(),
         }
     }
 
-    /// Matches `left` with `right` where `roi.matched` is set.
+    /// Matches `left` with `right` where `roi.matched` is set. `attention` is one value
+    /// per cell.
     pub fn run(
         &mut self,
         left: &View,
         right: &View,
         roi: &RoiMask,
-        saliency: &Image<f32>,
+        attention: &Image<f32>,
         coarse: &CoarseDisparity,
         out: &mut Matches,
     ) {
@@ -88,8 +95,10 @@ impl Stereo {
         self.plan.of_mask(&roi.matched, roi.fraction, Some(&coarse.checked), &search);
         let weighted = self.lambda > 0.0;
         if weighted {
+            upsample(self.level, attention, self.size, &mut self.saliency);
             self.weight.resize(self.size);
-            for (out, &s) in self.weight.pixels_mut().iter_mut().zip(saliency.pixels()) {
+            let saliency = self.saliency.pixels();
+            for (out, &s) in self.weight.pixels_mut().iter_mut().zip(saliency) {
                 *out = (255.0 / (1.0 + self.lambda * s.clamp(0.0, 1.0))) as u8;
             }
         }

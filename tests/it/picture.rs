@@ -125,7 +125,7 @@ fn every_picture_works_at_any_size_and_with_boxes_over_the_edge() {
     for (width, height) in [(1, 1), (2, 3), (17, 5), (5, 17), (333, 97), (1243, 376)] {
         let mut seen = perception(width, height);
         seen.left.rgb = Image::from_fn(Size::new(width, height), |x, y| [x as u8, y as u8, 90]);
-        seen.saliency.fill(f32::NAN);
+        seen.attention.fill(f32::NAN);
         add_region(&mut seen, [0, 0, width as u32, height as u32]);
         add_region(&mut seen, [width as u32 - 1, height as u32 - 1, 40, 30]);
         add_region(&mut seen, [u32::MAX, u32::MAX, 0, 0]);

@@ -46,8 +46,9 @@ fn what_the_budget_leaves_out_is_said_to_be_unmatched() {
         }
         assert!(matched(&out.disparity) <= matched(&whole.disparity));
         // Attention is paid everywhere.
-        assert_eq!(out.saliency.size(), SIZE);
-        assert!(out.saliency.pixels().iter().any(|&s| s > 0.55));
+        let saliency = out.saliency();
+        assert_eq!(saliency.size(), SIZE);
+        assert!(saliency.pixels().iter().any(|&s| s > 0.55));
     }
     assert!(fractions.is_sorted_by(|a, b| a >= b), "{fractions:?}");
     assert!(fractions[0] > 0.15 && fractions[2] > 0.0, "{fractions:?}");
@@ -112,7 +113,7 @@ fn a_gray_picture_and_equal_channels_are_seen_alike() {
         assert_eq!(own.left.is_gray, illumination == "none");
         assert!(!alike.left.is_gray);
         assert!(own.left.rgb.pixels() == alike.left.rgb.pixels());
-        assert!(own.saliency.pixels() == alike.saliency.pixels(), "{illumination}: attention");
+        assert!(own.attention.pixels() == alike.attention.pixels(), "{illumination}: attention");
         assert!(own.roi.matched.pixels() == alike.roi.matched.pixels(), "{illumination}: ROI");
         assert!(own.labels.pixels() == alike.labels.pixels(), "{illumination}: regions");
         assert!(!own.regions.is_empty());

@@ -53,7 +53,10 @@ fn scene(size: Size, index: u32, frame_id: &str) -> (Observation, Perception) {
     out.frame_id = Arc::from(frame_id);
     out.left.gray = Image::from_fn(size, |x, y| rgb.get(x, y)[1]);
     out.left.rgb = rgb.clone();
-    out.saliency = Image::from_fn(size, |x, y| if objects.get(x, y) != 0 { 0.9 } else { 0.2 });
+    out.attention = Image::from_fn(size.divided_by(4), |x, y| {
+        let (u, v) = ((4 * x + 2).min(width - 1), (4 * y + 2).min(height - 1));
+        if objects.get(u, v) != 0 { 0.9 } else { 0.2 }
+    });
     out.roi.salient = Image::from_fn(size, |x, y| if objects.get(x, y) != 0 { 255 } else { 0 });
     out.roi.matched = Image::from_fn(size, |x, y| {
         let near = things.iter().any(|([bx, by, w, h], _, _)| {

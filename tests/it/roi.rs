@@ -66,6 +66,24 @@ fn a_mask_of_bits_holds_what_was_put_in() {
 }
 
 #[test]
+fn a_mask_of_cells_is_that_of_their_pixels() {
+    let sizes = [1, 2, 61, 64, 67, 72, 131, 331].map(|width| Size::new(width, 23));
+    for size in ODD_SIZES.into_iter().chain(sizes) {
+        let cells = Noise(1).map(size.divided_by(4));
+        let (mut map, mut expected, mut bits) =
+            (Image::default(), BitMask::default(), BitMask::default());
+        upsample(simd::detect(), &cells, size, &mut map);
+        for threshold in [0.0, 0.3, 0.8, 0.97] {
+            expected.set_from(simd::detect(), &map, threshold);
+            for level in simd::available() {
+                bits.set_from_cells(level, &cells, size, threshold);
+                assert_eq!(bits, expected, "{size}, {threshold}, {level:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn morphology_equals_its_definition() {
     for size in ODD_SIZES {
         let mask = blobs(size, 2);
@@ -158,10 +176,8 @@ fn attention() -> Image<f32> {
 }
 
 fn run(config: &Config, coarse: &CoarseDisparity, rig: &StereoRig) -> RoiMask {
-    let (attention, mut saliency) = (attention(), Image::default());
-    upsample(simd::detect(), &attention, SIZE, &mut saliency);
     let mut out = RoiMask::default();
-    Roi::new(config, SIZE, simd::detect()).run(&attention, &saliency, coarse, rig, &mut out);
+    Roi::new(config, SIZE, simd::detect()).run(&attention(), coarse, rig, &mut out);
     assert_eq!((out.salient.size(), out.matched.size()), (SIZE, SIZE));
     assert!((out.fraction - share(&of(&out.matched))).abs() < 1e-6);
     out
@@ -266,12 +282,11 @@ fn full_frame_is_everything() {
 
 #[test]
 fn a_centred_rectangle_has_its_share_and_the_aspect_of_the_image() {
-    let (attention, saliency) = (attention(), Image::filled(SIZE, 1.0));
     for fraction in [0.0, 0.25, 0.5, 1.0] {
         let mut roi = Roi::new(&Config::default(), SIZE, simd::detect());
         roi.set_centred_rectangle(fraction);
         let mut out = RoiMask::default();
-        roi.run(&attention, &saliency, &unknown(), &rig(60.0), &mut out);
+        roi.run(&attention(), &unknown(), &rig(60.0), &mut out);
         let salient = of(&out.salient);
         assert!((share(&salient) - fraction).abs() < 0.01, "{} of {fraction}", share(&salient));
         assert_eq!(of(&out.matched), plain::dilate(&salient, 7));
@@ -287,11 +302,11 @@ fn a_centred_rectangle_has_its_share_and_the_aspect_of_the_image() {
 #[test]
 fn a_single_pixel_is_a_frame_too() {
     let size = Size::new(1, 1);
-    let (cell, pixel) = (Image::filled(size, 1.0), Image::filled(size, 1.0));
+    let cell = Image::filled(size, 1.0);
     let coarse = CoarseDisparity { checked: cell.clone(), filled: cell.clone() };
     let mut config = Config::default();
     config.regions.min_area = 1;
     let mut out = RoiMask::default();
-    Roi::new(&config, size, simd::detect()).run(&cell, &pixel, &coarse, &rig(60.0), &mut out);
+    Roi::new(&config, size, simd::detect()).run(&cell, &coarse, &rig(60.0), &mut out);
     assert_eq!((out.salient.pixels(), out.fraction), (&[255][..], 1.0));
 }

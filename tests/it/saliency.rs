@@ -137,7 +137,8 @@ fn run(
     let (mut attention, mut saliency) = (Image::default(), Image::default());
     let rig = rig(left.gray.size());
     let scene = Scene { stamp: Stamp::default(), left, coarse, rig: &rig };
-    stage.run(&scene, previous, &mut attention, &mut saliency);
+    stage.run(&scene, previous, &mut attention);
+    upsample(simd::detect(), &attention, left.gray.size(), &mut saliency);
     (attention, saliency)
 }
 
@@ -196,11 +197,19 @@ fn the_quarter_size_view_holds_means() {
 
 #[test]
 fn upsampling_interpolates_between_cell_centres() {
-    for size in ODD_SIZES {
+    // Rows of fewer cells than a vector has, of as many, and of more.
+    let sizes = [1, 2, 61, 64, 67, 72, 131, 331].map(|width| Size::new(width, 23));
+    for size in ODD_SIZES.into_iter().chain(sizes) {
         let cells = Noise(3).map(size.divided_by(4));
-        let mut out = Image::default();
-        upsample(simd::detect(), &cells, size, &mut out);
-        assert_near(&out, &plain::upsample(&cells, size), 1e-6, "upsampling");
+        let expected = plain::upsample(&cells, size);
+        let mut maps = simd::available().into_iter().map(|level| {
+            let mut out = Image::default();
+            upsample(level, &cells, size, &mut out);
+            assert_near(&out, &expected, 1e-6, &format!("upsampling, {size}, {level:?}"));
+            out
+        });
+        let first = maps.next();
+        assert!(maps.all(|map| Some(map) == first), "the levels differ, {size}");
     }
 }
 

@@ -390,11 +390,11 @@ fn a_pale_thing_in_a_still_is_of_interest_and_an_empty_still_is_not() {
         };
         let mut stage = Saliency::new(&Config::default(), size, simd::detect());
         let (mut previous, rig) = (Previous::default(), rig());
-        let (mut map, mut pixels) = (Image::default(), Image::default());
+        let mut map = Image::default();
         for frame in 0..frames {
             let stamp = Stamp(100_000_000 * frame as i64);
             let scene = Scene { stamp, left: &left, coarse: &coarse, rig: &rig };
-            stage.run(&scene, &mut previous, &mut map, &mut pixels);
+            stage.run(&scene, &mut previous, &mut map);
         }
         map
     };

@@ -385,12 +385,12 @@ fn a_plane_before_a_background_is_found_to_a_fraction_of_a_pixel() {
         let everything = Image::filled(size, 255);
         let roi = RoiMask { salient: everything.clone(), matched: everything, fraction: 1.0 };
         let mut matches = Matches::default();
-        let saliency = Image::filled(size, 1.0);
+        let attention = Image::filled(size.divided_by(4), 1.0);
         Stereo::new(&config, size, level).run(
             &left,
             &right,
             &roi,
-            &saliency,
+            &attention,
             &coarse,
             &mut matches,
         );
@@ -426,12 +426,12 @@ fn one_and_two_threads_give_the_same_matches() {
                 Image::from_fn(size, |x, y| if (x / 50 + y / 50) % 2 == 0 { 255 } else { 0 });
             let roi = RoiMask { salient: matched.clone(), matched, fraction: 0.5 };
             let mut matches = Matches::default();
-            let saliency = Image::filled(size, 1.0);
+            let attention = Image::filled(size.divided_by(4), 1.0);
             Stereo::new(&config, size, simd::detect()).run(
                 &left,
                 &right,
                 &roi,
-                &saliency,
+                &attention,
                 &coarse,
                 &mut matches,
             );

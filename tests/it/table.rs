@@ -152,8 +152,8 @@ impl Watch {
     fn look(&mut self, disparity: Image<f32>) -> (GroundState, Image<f32>) {
         let coarse = CoarseDisparity { checked: disparity.clone(), filled: disparity };
         let scene = Scene { stamp: Stamp(0), left: &self.left, coarse: &coarse, rig: &rig() };
-        let (mut cells, mut pixels) = (Image::default(), Image::default());
-        self.stage.run(&scene, &mut self.previous, &mut cells, &mut pixels);
+        let mut cells = Image::default();
+        self.stage.run(&scene, &mut self.previous, &mut cells);
         (self.stage.footing().unwrap().state, cells)
     }
 }

@@ -100,7 +100,7 @@ fn left(perception: &Perception, stride: usize) -> Result<Vec<u8>, picture::Pict
 
 /// Heat whose opacity grows with the attention.
 fn saliency(perception: &Perception) -> Result<Layer, png::EncodingError> {
-    let map = &perception.saliency;
+    let map = perception.saliency();
     let size = map.size().divided_by(SALIENCY_CELL);
     let indices = Image::from_fn(size, |x, y| {
         let middle = SALIENCY_CELL / 2;

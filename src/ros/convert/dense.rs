@@ -90,7 +90,7 @@ pub fn confidence_image(perception: &Perception) -> sensor_msgs::Image {
 
 /// Saliency as `32FC1`, 0..=1.
 pub fn saliency_image(perception: &Perception) -> sensor_msgs::Image {
-    float_image(&perception.saliency, header(perception))
+    float_image(&perception.saliency(), header(perception))
 }
 
 /// Any labels as `mono16`.
@@ -203,7 +203,7 @@ mod tests {
             vec![1.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 70.0, 0.0004],
         )
         .unwrap();
-        p.saliency.set(0, 1, 0.25);
+        p.attention.set(0, 0, 0.25);
         p.confidence.set(2, 1, 0.75);
         p
     }
@@ -274,7 +274,7 @@ mod tests {
     #[test]
     fn maps_and_pictures_keep_their_values() {
         let p = perception();
-        assert_eq!(floats(&saliency_image(&p)).unwrap(), p.saliency);
+        assert_eq!(floats(&saliency_image(&p)).unwrap(), p.saliency());
         assert_eq!(floats(&confidence_image(&p)).unwrap(), p.confidence);
         let image = Image::from_fn(Size::new(3, 2), |x, y| (300 * x + y) as u16);
         let m = label_image(&image, Header::default());

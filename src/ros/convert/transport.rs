@@ -26,12 +26,12 @@ pub fn compressed_rgb(image: &Image<[u8; 3]>, header: Header) -> CompressedImage
 
 /// `saliency/image_rect/compressed`: PNG of 8 bits, 255 for saliency 1.
 pub fn compressed_saliency(perception: &Perception) -> CompressedImage {
-    let values: Vec<u8> =
-        perception.saliency.pixels().iter().map(|s| (s * 255.0 + 0.5) as u8).collect();
+    let saliency = perception.saliency();
+    let values: Vec<u8> = saliency.pixels().iter().map(|s| (s * 255.0 + 0.5) as u8).collect();
     CompressedImage {
         header: header(perception),
         format: "mono8; png compressed mono8".into(),
-        data: png(&values, perception.saliency.size(), ExtendedColorType::L8),
+        data: png(&values, saliency.size(), ExtendedColorType::L8),
     }
 }
 
@@ -169,11 +169,11 @@ mod tests {
     #[test]
     fn saliency_and_pictures_are_read_back() {
         let mut p = perception();
-        p.saliency.set(3, 2, 1.0);
-        p.saliency.set(4, 2, 0.5);
+        p.attention.set(0, 0, 1.0);
         let m = compressed_saliency(&p);
         let Picture::Gray(image) = compressed_picture(&m).unwrap() else { panic!() };
-        assert_eq!((image.get(3, 2), image.get(4, 2), image.get(0, 0)), (255, 128, 0));
+        // The last pixel of the first cell, the first one of the next cell, and far away.
+        assert_eq!([0, 3, 4, 40].map(|x| image.get(x, 0)), [255, 159, 96, 0]);
         assert!(m.format.starts_with("mono8; png"));
         let flat = Image::filled(Size::new(16, 16), [200, 100, 50]);
         let m = compressed_rgb(&flat, Header::default());

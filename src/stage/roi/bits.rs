@@ -4,6 +4,8 @@ use rayon::prelude::*;
 
 use crate::image::{Image, Size};
 use crate::simd::{Level, Simd, dispatch, f32x16, mask8x64, prelude::*, u8x64};
+use crate::stage::coarse::CELL;
+use crate::stage::saliency::upsample::Rows;
 
 /// Pixels per word; pixel `x` of a row is bit `x % 64` of its word `x / 64`.
 const WORD: usize = u64::BITS as usize;
@@ -80,6 +82,21 @@ impl BitMask {
         self.words.par_chunks_exact_mut(self.stride).zip(rows).with_min_len(32).for_each(
             |(words, row)| dispatch!(level, simd => compare_row(simd, row, threshold, words)),
         );
+    }
+
+    /// The pixels of an image of `size` at which [`upsample`](crate::stage::saliency::upsample)
+    /// makes at least `threshold` of a map over its cells.
+    pub fn set_from_cells(&mut self, level: Level, cells: &Image<f32>, size: Size, threshold: f32) {
+        self.reset(size);
+        if size.is_empty() || cells.size() != size.divided_by(CELL) {
+            return;
+        }
+        self.words.par_chunks_exact_mut(self.stride).with_min_len(32).enumerate().for_each(
+            |(y, words)| {
+                dispatch!(level, simd => Rows::at(cells, y).compare(simd, threshold, words));
+            },
+        );
+        self.clear_tails();
     }
 
     /// Writes 255 for set bits and 0 for others.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*};
 use crate::stage::coarse::CELL;
 
 /// Cells that are taken at once.
@@ -90,18 +90,41 @@ impl Rows<'_> {
 
     #[inline(always)]
     fn spread_cells<S: Simd>(&self, simd: S, x: usize, out: &mut [f32]) {
-        let here = self.lanes(simd, x);
-        let before = self.lanes(simd, x - 1) - here;
-        let after = self.lanes(simd, x + 1) - here;
-        let (first, third) = (here + before * OUTER, here + after * INNER);
-        let (second, fourth) = (here + before * INNER, here + after * OUTER);
-        let (odd, even) = (first.interleave(third), second.interleave(fourth));
-        let (low, high) = (odd.0.interleave(even.0), odd.1.interleave(even.1));
-        for (out, pixels) in
-            out.as_chunks_mut::<LANES>().0.iter_mut().zip([low.0, low.1, high.0, high.1])
-        {
+        let around = [self.lanes(simd, x - 1), self.lanes(simd, x), self.lanes(simd, x + 1)];
+        let pixels = between(around);
+        for (out, pixels) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(pixels) {
             pixels.store_slice(out);
         }
+    }
+
+    /// Sets the bits of pixels of at least `threshold`, pixel `i % 64` of word `i / 64`;
+    /// beyond the last one they mean nothing.
+    #[inline(always)]
+    pub(in crate::stage) fn compare<S: Simd>(&self, simd: S, threshold: f32, words: &mut [u64]) {
+        let mut before = f32x16::splat(simd, self.value(0));
+        let mut here = self.lanes_or_last(simd, 0);
+        for (i, word) in words.iter_mut().enumerate() {
+            let after = self.lanes_or_last(simd, (i + 1) * LANES);
+            let around = [before.slide::<{ LANES - 1 }>(here), here, here.slide::<1>(after)];
+            // What is between values exceeds none of them.
+            let [left, middle, right] = around;
+            *word = 0;
+            if left.max(middle).max(right).simd_ge(threshold).any_true() {
+                for (i, pixels) in between(around).into_iter().enumerate() {
+                    *word |= pixels.simd_ge(threshold).to_bitmask() << (i * LANES);
+                }
+            }
+            (before, here) = (here, after);
+        }
+    }
+
+    /// As [`Rows::lanes`]; the last value goes on beyond the end.
+    #[inline(always)]
+    fn lanes_or_last<S: Simd>(&self, simd: S, x: usize) -> f32x16<S> {
+        let last = self.upper.len() - 1;
+        let upper: f32x16<S> = padded(simd, self.upper, x, self.upper[last]);
+        let lower: f32x16<S> = padded(simd, self.lower, x, self.lower[last]);
+        upper + (lower - upper) * self.share
     }
 
     #[inline(always)]
@@ -110,6 +133,18 @@ impl Rows<'_> {
         let lower = f32x16::from_slice(simd, &self.lower[x..x + LANES]);
         upper + (lower - upper) * self.share
     }
+}
+
+/// The pixels of cells in their order, from the values of the cells before, of
+/// themselves and of those after.
+#[inline(always)]
+fn between<S: Simd>([before, here, after]: [f32x16<S>; 3]) -> [f32x16<S>; CELL] {
+    let (before, after) = (before - here, after - here);
+    let (first, third) = (here + before * OUTER, here + after * INNER);
+    let (second, fourth) = (here + before * INNER, here + after * OUTER);
+    let (odd, even) = (first.interleave(third), second.interleave(fourth));
+    let (low, high) = (odd.0.interleave(even.0), odd.1.interleave(even.1));
+    [low.0, low.1, high.0, high.1]
 }
 
 /// Shares of the neighbour in a cell's outer and inner pixels.

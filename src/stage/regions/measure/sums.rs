@@ -130,8 +130,8 @@ impl Sums {
                 // Beyond the box there is no pixel of this id.
                 let at: u32x16<S> = padded(simd, ids, x, 0);
                 if let Some(mask) = mask.first_chunk_mut::<LANES>() {
-                    for i in 0..LANES {
-                        mask[i] = if at.as_slice()[i] == id { 255 } else { 0 };
+                    for (mask, at) in mask.iter_mut().zip(at.as_array()) {
+                        *mask = if *at == id { 255 } else { 0 };
                     }
                 } else {
                     for (mask, at) in mask.iter_mut().zip(at.as_slice()) {
