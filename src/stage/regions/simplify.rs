@@ -126,3 +126,72 @@ fn take_farthest(distances: &[f64], first: usize, worst: &mut (f64, usize)) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd;
+
+    /// Squared distance of a point from a segment, times the segment's squared length
+    /// (or 1).
+    fn distance(point: [i32; 2], from: [i32; 2], to: [i32; 2]) -> i64 {
+        let part = |a: [i32; 2], b: [i32; 2]| [0, 1].map(|i| i64::from(a[i] - b[i]));
+        let dot = |a: [i64; 2], b: [i64; 2]| a[0] * b[0] + a[1] * b[1];
+        let (p, along) = (part(point, from), part(to, from));
+        let scale = dot(along, along).max(1);
+        let q = part(point, to);
+        match dot(p, along) {
+            ..=0 => dot(p, p) * scale,
+            at if at >= scale => dot(q, q) * scale,
+            _ => (p[0] * along[1] - p[1] * along[0]).pow(2),
+        }
+    }
+
+    fn part(points: &[[i32; 2]], from: usize, to: usize, limit: i64, keep: &mut [bool]) {
+        let (a, b) = (points[from], points[to % points.len()]);
+        let farthest = (from + 1..to)
+            .map(|i| (distance(points[i], a, b), std::cmp::Reverse(i)))
+            .max()
+            .map(|(distance, at)| (distance, at.0));
+        let [x, y] = [0, 1].map(|i| i64::from(b[i] - a[i]));
+        if let Some((distance, i)) = farthest.filter(|f| f.0 > limit * (x * x + y * y).max(1)) {
+            assert!(distance > 0);
+            keep[i] = true;
+            part(points, from, i, limit, keep);
+            part(points, i, to, limit, keep);
+        }
+    }
+
+    #[test]
+    fn long_outlines_are_simplified_alike_at_every_level() {
+        for n in [1, 2, 3, 15, 16, 17, 18, 40, 500, 9001] {
+            // A curve with waves, bends back and corners.
+            let points: Vec<[i32; 2]> = (0..n)
+                .map(|i| {
+                    let t = i as f64 / n as f64 * std::f64::consts::TAU;
+                    let radius = 600.0 + 90.0 * (7.0 * t).sin() + 25.0 * (61.0 * t).cos();
+                    let bend = t + 0.2 * (31.0 * t).sin();
+                    [bend.cos(), bend.sin()].map(|unit| (700.0 + radius * unit).round() as i32)
+                })
+                .collect();
+            for tolerance in [0, 1, 3, 40] {
+                let mut keep = vec![false; n];
+                let start = points[0];
+                let far = |i: &usize| (distance(points[*i], start, start), std::cmp::Reverse(*i));
+                let opposite = (0..n).max_by_key(far).unwrap_or(0);
+                (keep[0], keep[opposite]) = (true, true);
+                let limit = i64::from(tolerance * tolerance);
+                part(&points, 0, opposite, limit, &mut keep);
+                part(&points, opposite, n, limit, &mut keep);
+                if n > 2 && keep.iter().filter(|keep| **keep).count() == 2 {
+                    *keep.iter_mut().find(|keep| !**keep).unwrap() = true;
+                }
+                for level in simd::available() {
+                    let mut simplify = Simplify::new(level);
+                    let found = simplify.run(&points, tolerance as f32);
+                    assert_eq!(found, keep, "{n} points, {tolerance} px, {level:?}");
+                }
+            }
+        }
+    }
+}
