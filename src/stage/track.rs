@@ -37,7 +37,7 @@ const SAME_PART: f32 = 0.1;
 const SAME_PX: f32 = 1.0;
 /// Share of a prediction's pixels that must speak for it: an outline of which less
 /// is left is not that of the thing any more.
-const LEAST_FOR: f32 = 0.82;
+const LEAST_FOR: f32 = 0.75;
 
 /// A track and a region that may be the same thing.
 #[derive(Clone, Copy, Debug)]
@@ -124,10 +124,10 @@ impl Track {
     /// size where it is predicted, which continues no other track better, takes its
     /// id back.
     ///
-    /// A coasted region is published only where the thing probably still is: at least 82 %
-    /// of its predicted pixels must show in `disparity` (pixels, NaN where there is
-    /// none) its own distance, outside of the regions of this frame in `labels`,
-    /// or something nearer that hides it. What lies behind it, a region at the same
+    /// A coasted region is published only where the thing probably still is: at least
+    /// three quarters of its predicted pixels must show in `disparity` (pixels, NaN
+    /// where there is none) its own distance, outside of the regions of this frame in
+    /// `labels`, or something nearer that hides it. What lies behind it, a region at the same
     /// distance (the thing under another identity) and what was not measured (of a
     /// post, what is above the region of interest) do not speak for it. Things that
     /// never had a position are published.
