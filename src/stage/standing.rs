@@ -4,6 +4,8 @@ pub mod climb;
 pub mod column;
 pub mod join;
 mod sides;
+mod split;
+mod thing;
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
@@ -11,112 +13,19 @@ use crate::simd::{Level, dispatch};
 use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
 use column::{Columns, Segment, Top};
-use join::Join;
+use join::{Join, View};
 use sides::sides;
+use split::Split;
+pub use thing::Thing;
 
 /// Pixels that a cell is wide: poles, legs and the gaps between things are narrow.
 pub const WIDE: usize = 2;
 /// Pixels that a cell is high: what stands is higher than wide.
 pub const HIGH: usize = 4;
-/// Share of its columns from which a thing that goes on upward is part of a
-/// building, if it is wider than a trunk or a pole, metres.
-const MOST_TALL: f32 = 0.45;
-const TRUNK_M: f32 = 1.2;
-/// A thing reaches at least this height, metres (of a road scene).
-const LEAST_TOP_M: f32 = 0.35;
-/// and this part of its length: a bank of earth or a kerb is lower.
-const LEAST_RISE: f32 = 0.1;
-/// Share of a thing's columns that must reach the ground.
-const LEAST_CONTACT: f32 = 0.3;
 /// Share of a thing's cells that its box leaves out on every side.
 const TRIM: f32 = 0.04;
 /// Cells across a pole, at most.
 const MOST_WIDE: usize = 6;
-/// Share of a thing's sides that must be free of anything nearer.
-const LEAST_FREE: f32 = 0.3;
-
-/// Width in metres from which what does not reach the ground may be a plate on a post
-/// too thin to be seen: a traffic sign, which is as large on every road. It is no
-/// wider than a trunk or a pole may be.
-const PLATE_M: f32 = 0.3;
-/// Share of its sides, of so many cells at least, behind which it is farther away.
-const PLATE_FREE: f32 = 0.8;
-const PLATE_SIDES: u32 = 6;
-
-/// One thing on the ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Thing {
-    /// Number of cells.
-    pub cells: u32,
-    /// Cells above those, of surfaces that end below a lorry's height.
-    above: u32,
-    /// Left and right end in the camera's frame, metres.
-    pub lateral_m: [f32; 2],
-    /// Height of its highest cell above the ground, metres.
-    pub top_m: f32,
-    /// Nearest and farthest segment, metres.
-    pub depth_m: [f32; 2],
-    /// Columns of cells, how many of them stand on the ground, how many of them
-    /// go on above a lorry's height, how many are covered there.
-    columns: u32,
-    contacts: u32,
-    tall: u32,
-    covered: u32,
-    /// Cells at its sides with something farther and something nearer beyond.
-    free: u32,
-    hidden: u32,
-    /// As narrow as a trunk or a pole.
-    narrow: bool,
-    /// Held up by a post that is not seen.
-    plate: bool,
-}
-
-impl Thing {
-    /// Left to right and near to far, metres.
-    fn size_m(&self) -> [f32; 2] {
-        [self.lateral_m, self.depth_m].map(|[from, to]| to - from)
-    }
-
-    fn part(&self, columns: u32) -> f32 {
-        columns as f32 / self.columns as f32
-    }
-
-    fn is_large(&self, scale: f32, least_cells: u32) -> bool {
-        let low = (LEAST_TOP_M * scale).max(LEAST_RISE * self.size_m()[0]);
-        let above = if self.stands() { 0 } else { self.above };
-        self.cells + above >= least_cells && self.top_m >= low
-    }
-
-    fn stands(&self) -> bool {
-        self.part(self.contacts) >= LEAST_CONTACT
-    }
-
-    fn is_narrow(&self) -> bool {
-        let [width, depth] = self.size_m();
-        width.max(depth) <= TRUNK_M
-    }
-
-    fn goes_on(&self) -> bool {
-        self.part(self.tall + self.covered) > MOST_TALL
-    }
-
-    fn is_building(&self) -> bool {
-        !self.is_narrow() && self.goes_on()
-    }
-
-    fn is_plate(&self) -> bool {
-        let sides = self.free + self.hidden;
-        let apart = sides >= PLATE_SIDES && self.free as f32 >= PLATE_FREE * sides as f32;
-        let wide = self.size_m()[0] >= PLATE_M;
-        !self.stands() && self.is_narrow() && wide && !self.goes_on() && apart
-    }
-
-    fn is_behind(&self) -> bool {
-        let sides = self.free + self.hidden;
-        // Far away nothing beside a thing differs enough to tell.
-        if sides == 0 { self.goes_on() } else { (self.free as f32) < LEAST_FREE * sides as f32 }
-    }
-}
 
 /// The things of a frame and where they are.
 #[derive(Debug, Default)]
@@ -125,7 +34,8 @@ pub struct Things {
     pub ids: Image<u32>,
     /// Per cell of a thing the disparity of its surface there (`cx_l - cx_r` subtracted).
     pub surface: Image<f32>,
-    /// The things, from left to right by their first column.
+    /// The things, from left to right by their first column; parts of what was taken
+    /// for one at the end.
     pub list: Vec<Thing>,
     /// Candidates that do not reach the ground.
     pub floating: u32,
@@ -140,6 +50,7 @@ pub struct Standing {
     level: Level,
     columns: Columns,
     join: Join,
+    split: Split,
     thing: Vec<u32>,
     rows: Vec<u32>,
     seen: Vec<u32>,
@@ -153,6 +64,7 @@ impl Standing {
             level,
             columns: Columns::new(level),
             join: Join::default(),
+            split: Split::default(),
             thing: Vec::new(),
             rows: Vec::new(),
             seen: Vec::new(),
@@ -171,22 +83,15 @@ impl Standing {
         out: &mut Things,
     ) {
         self.columns.find(disparity, plane);
-        let scale = size_scale(plane);
-        self.join.run(disparity, &self.columns, scale, rig);
-        self.collect(disparity, scale, rig, least_cells, out);
+        let view = View::new(size_scale(plane), rig);
+        self.join.run(disparity, &self.columns, &view);
+        self.collect(disparity, &view, least_cells, out);
+        self.part(&view, least_cells, &mut out.list);
         self.paint(disparity, out);
     }
 
-    fn collect(
-        &mut self,
-        disparity: &Image<f32>,
-        scale: f32,
-        rig: &StereoRig,
-        least_cells: u32,
-        out: &mut Things,
-    ) {
-        let (depth_scale, focal) = (rig.depth_scale() as f32, rig.focal_px() as f32);
-        let cx = rig.principal_point().0 as f32;
+    fn collect(&mut self, disparity: &Image<f32>, view: &View, least_cells: u32, out: &mut Things) {
+        let scale = view.scale;
         out.list.clear();
         out.floating = 0;
         out.background = 0;
@@ -194,27 +99,11 @@ impl Standing {
         for (i, s) in self.columns.segments.iter().enumerate() {
             let root = self.join.set_of(i as u32) as usize;
             if root == i {
-                out.list.push(Thing {
-                    lateral_m: [f32::INFINITY, f32::NEG_INFINITY],
-                    depth_m: [f32::INFINITY, f32::NEG_INFINITY],
-                    ..Thing::default()
-                });
+                out.list.push(Thing::EMPTY);
             }
             let thing = if root == i { out.list.len() as u32 } else { self.thing[root] };
             self.thing.push(thing);
-            let t = &mut out.list[thing as usize - 1];
-            let z = depth_scale / s.disparity();
-            let left = (s.x as f32 * WIDE as f32 - 0.5 - cx) * z / focal;
-            t.cells += s.cells;
-            t.above += if s.top == Top::Tall { 0 } else { s.upper.saturating_sub(s.reach) };
-            t.columns += 1;
-            t.contacts += u32::from(s.contact);
-            t.tall += u32::from(s.top == Top::Tall);
-            t.covered += u32::from(s.top == Top::Covered);
-            t.lateral_m[0] = t.lateral_m[0].min(left);
-            t.lateral_m[1] = t.lateral_m[1].max(left + WIDE as f32 * z / focal);
-            t.top_m = t.top_m.max(s.top_m);
-            t.depth_m = [t.depth_m[0].min(z), t.depth_m[1].max(z)];
+            out.list[thing as usize - 1].add(s, view);
         }
         self.look_aside(disparity, scale, least_cells, &mut out.list);
         // Things that are none get the number 0, the others new ones.
@@ -228,7 +117,8 @@ impl Standing {
             out.floating += u32::from(large && !stands);
             out.background += u32::from(large && stands && background);
             if large && stands && !background {
-                out.list[kept] = Thing { narrow: thing.is_narrow(), plate, ..thing };
+                out.list[kept] = thing;
+                (out.list[kept].narrow, out.list[kept].plate) = (thing.is_narrow(), plate);
                 kept += 1;
                 self.seen.push(kept as u32);
             } else {
@@ -238,6 +128,27 @@ impl Standing {
         out.list.truncate(kept);
         for thing in &mut self.thing {
             *thing = self.seen[*thing as usize - 1];
+        }
+    }
+
+    /// Makes two of things that are rather two; the right one comes last.
+    fn part(&mut self, view: &View, least_cells: u32, list: &mut Vec<Thing>) {
+        let Self { columns, thing, split, seen: right, .. } = self;
+        let cuts = split.run(&columns.segments, thing, list.len(), view, least_cells);
+        right.clear();
+        for (i, cut) in cuts.iter().enumerate() {
+            if cut.is_some() {
+                list[i] = Thing::EMPTY;
+                list.push(Thing::EMPTY);
+            }
+            right.push(list.len() as u32);
+        }
+        for (s, thing) in columns.segments.iter().zip(thing).filter(|(_, thing)| **thing != 0) {
+            let index = *thing as usize - 1;
+            if let Some(cut) = cuts[index] {
+                *thing = if s.x < cut { *thing } else { right[index] };
+                list[*thing as usize - 1].add(s, view);
+            }
         }
     }
 

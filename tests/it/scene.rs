@@ -228,6 +228,38 @@ fn the_side_of_a_car_that_recedes_is_a_part_of_it() {
     assert!(near < rear as f32 + 0.2 && far > front as f32 - 0.7, "{near} {far}");
 }
 
+/// A street with surfaces 1.5 m high at the right, of which `depth` tells how far away
+/// they are in each direction from the axis (lateral metres per metre).
+fn receding(depth: impl Fn(f64) -> Option<f64>) -> Image<f32> {
+    let street = upright(&[]);
+    Image::from_fn(street.size(), |x, y| {
+        let (u, v) = standing::centre(x, y);
+        let z = depth((f64::from(u) - 320.0) / F);
+        z.filter(|z| (0.0..1.5).contains(&(HEIGHT - (f64::from(v) - HORIZON) * z / F)))
+            .map_or(street.get(x, y), |z| (F * BASELINE / z) as f32)
+    })
+}
+
+#[test]
+fn cars_nose_to_tail_are_two_and_a_bus_is_one() {
+    // Rears and sides of cars 4.5 m long, 0.5 m apart, 3.5 m beside the camera.
+    let car = |rear: f64, slope: f64| {
+        let side = 3.5 / slope;
+        let seen = slope <= 5.2 / rear && side < rear + 4.5;
+        seen.then_some(side.max(rear))
+    };
+    let one = things(&receding(|slope| car(20.0, slope))).list;
+    assert_eq!(one.len(), 1, "{one:?}");
+    let two = things(&receding(|slope| car(20.0, slope).or_else(|| car(25.0, slope)))).list;
+    assert_eq!(two.len(), 2, "{two:?}");
+    let far = |i: usize| two[i].depth_m[1];
+    assert!(far(0).min(far(1)) < 25.0 && far(0).max(far(1)) > 28.0, "{two:?}");
+    // The side of a bus is as deep as two cars.
+    let bus = |slope: f64| Some(3.5 / slope).filter(|z| (18.0..30.0).contains(z));
+    let bus = things(&receding(bus)).list;
+    assert_eq!(bus.len(), 1, "{bus:?}");
+}
+
 #[test]
 fn on_the_axis_a_car_is_not_one_with_what_is_far_behind_it() {
     // There what recedes could be at any depth in the next column.

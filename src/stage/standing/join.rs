@@ -56,13 +56,12 @@ impl Join {
     ///
     /// Where one surface hides another, cells hold a mixture of both. Such
     /// pieces are short: they take a thing, but never make one of two.
-    pub fn run(&mut self, disparity: &Image<f32>, columns: &Columns, scale: f32, rig: &StereoRig) {
-        let view = View::new(scale, rig);
+    pub fn run(&mut self, disparity: &Image<f32>, columns: &Columns, view: &View) {
         let Columns { segments, first, .. } = columns;
         self.places.clear();
         self.places.extend((0..).zip(segments).map(|(i, s)| view.place(i, s)));
         self.strong.clear();
-        let least = STRONG_M * scale;
+        let least = STRONG_M * view.scale;
         self.strong.extend(self.places.iter().map(|place| {
             let rows = (place.lower - place.upper) as f32 * HIGH as f32;
             rows * place.distance >= least * view.focal
@@ -78,9 +77,9 @@ impl Join {
         }
         self.first_strong.push(self.strong_places.len() as u32);
         self.sets.reset(segments.len());
-        self.beside(disparity, columns, &view);
-        self.above(columns, &view);
-        self.attach(columns, &view);
+        self.beside(disparity, columns, view);
+        self.above(columns, view);
+        self.attach(columns, view);
     }
 
     /// Strong segments side by side with nothing seen through between them.
@@ -214,15 +213,20 @@ struct Place {
 }
 
 /// What is needed to reckon with segments in space.
-struct View {
-    scale: f32,
-    depth_scale: f32,
-    focal: f32,
-    cx: f32,
+pub struct View {
+    /// Size of things against a road's.
+    pub scale: f32,
+    /// f B, pixels x metres.
+    pub depth_scale: f32,
+    /// Focal length, pixels.
+    pub focal: f32,
+    /// Column of the principal point, pixels.
+    pub cx: f32,
 }
 
 impl View {
-    fn new(scale: f32, rig: &StereoRig) -> Self {
+    /// For things of `scale`, seen by `rig`.
+    pub fn new(scale: f32, rig: &StereoRig) -> Self {
         Self {
             scale,
             depth_scale: rig.depth_scale() as f32,
