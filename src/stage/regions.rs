@@ -21,7 +21,7 @@ use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
 use crate::perception::{Region, RegionList, Rejections, RoiMask, View};
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, mask16x16, prelude::*, u8x16, u16x16};
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::depth::Depth;
 use crate::stage::ground::Plane;
@@ -220,7 +220,7 @@ impl Regions {
                 labels.row_mut(y).fill(0);
             }
             for region in regions.iter() {
-                dispatch!(self.level, _simd => mark(region, band.clone(), labels));
+                dispatch!(self.level, simd => mark(simd, region, band.clone(), labels));
             }
         }
         let Self { workers, contour_tolerance, .. } = self;
@@ -241,34 +241,31 @@ const BAND: usize = 8;
 /// Writes the label of a region into rows `band`, sixteen pixels at a time and
 /// the last sixteen of a row once more: rows are short.
 #[inline(always)]
-fn mark(region: &Region, band: Range<usize>, labels: &mut Image<u16>) {
-    const LANES: usize = 16;
+fn mark<S: Simd>(simd: S, region: &Region, band: Range<usize>, labels: &mut Image<u16>) {
+    let label = u16x16::splat(simd, region.label);
     let (x, y) = (region.x as usize, region.y as usize);
     let (width, height) = (region.width as usize, region.height as usize);
     for y_of in band.start.max(y)..band.end.min(y + height) {
         let mask = &region.mask[(y_of - y) * width..][..width];
         let row = &mut labels.row_mut(y_of)[x..x + width];
-        let whole = mask.as_chunks::<LANES>().0.iter().zip(row.as_chunks_mut::<LANES>().0);
-        for (mask, row) in whole {
-            mark_lanes(region.label, mask, row);
+        for (mask, row) in mask.as_chunks().0.iter().zip(row.as_chunks_mut().0) {
+            mark_lanes(simd, label, mask, row);
         }
         if let (Some(mask), Some(row)) = (mask.last_chunk(), row.last_chunk_mut()) {
-            mark_lanes::<LANES>(region.label, mask, row);
+            mark_lanes(simd, label, mask, row);
         } else {
-            for (mask, pixel) in mask.iter().zip(row) {
-                mark_lanes(region.label, &[*mask], std::array::from_mut(pixel));
+            for (_, pixel) in mask.iter().zip(row).filter(|(mask, _)| **mask != 0) {
+                *pixel = region.label;
             }
         }
     }
 }
 
 #[inline(always)]
-fn mark_lanes<const N: usize>(label: u16, mask: &[u8; N], row: &mut [u16; N]) {
-    // Read before it is asked for: else there would be a branch for each.
-    let old = *row;
-    for i in 0..N {
-        row[i] = if mask[i] != 0 { label } else { old[i] };
-    }
+fn mark_lanes<S: Simd>(simd: S, label: u16x16<S>, mask: &[u8; 16], row: &mut [u16; 16]) {
+    let old = u16x16::load_array_ref(simd, row);
+    let outside = u8x16::load_array_ref(simd, mask).simd_eq(0).to_bitmask();
+    mask16x16::from_bitmask(simd, outside).select(old, label).store_slice(row);
 }
 
 /// How many of `regions` each of the workers gets, at most.

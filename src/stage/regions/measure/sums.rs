@@ -172,6 +172,9 @@ impl Sums {
             for x in (rows.x0..rows.x1).step_by(LANES) {
                 let at: u32x16<S> = padded(simd, ids, x, 0);
                 let inside = at.simd_eq(own);
+                if !inside.any_true() {
+                    continue;
+                }
                 let d: f32x16<S> = padded(simd, d, x, 0.0);
                 let known = inside & d.simd_eq(d);
                 sum += known.select(padded(simd, confidence, x, 0.0), zero);

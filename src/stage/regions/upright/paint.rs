@@ -1,6 +1,6 @@
 //! From cells to pixels: the things' own outlines.
 
-use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, u8x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, padded, prelude::*, u8x16, u32x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
@@ -188,6 +188,7 @@ impl Painter {
                 let own = holes.simd_ge(u8x16::splat(simd, OWN)).to_bitmask();
                 let inside = holes.simd_eq(u8x16::splat(simd, INSIDE)).to_bitmask();
                 let all = u64::MAX >> (64 - LANES.min(columns.end - x));
+                let (mut seen, mut seen_rows, mut area) = (0, 0_u64, 0);
                 for y in rows.clone() {
                     // What does not rise above the ground is none of the thing.
                     let ground = slope + plane.a * y as f32 + plane.c + GROUND_PX;
@@ -202,8 +203,20 @@ impl Painter {
                         // The left pixel of a cell tells.
                         bits |= holes & (inside | ((none & LEFT) * CELL_BITS));
                     }
-                    write(&mut out.ids.row_mut(y)[x..], out.first + id - 1, bits);
-                    painted.add(x, y, bits);
+                    write(simd, &mut out.ids.row_mut(y)[x..], out.first + id - 1, bits);
+                    seen |= bits;
+                    seen_rows |= u64::from(bits != 0) << (y - rows.start);
+                    area += bits.count_ones() as usize;
+                }
+                if seen != 0 {
+                    let ends = |at: usize, bits: u64| {
+                        (
+                            at + bits.trailing_zeros() as usize,
+                            at + 64 - bits.leading_zeros() as usize,
+                        )
+                    };
+                    let ((x0, x1), (y0, y1)) = (ends(x, seen), ends(rows.start, seen_rows));
+                    painted.join(&PixelBox { x0, y0, x1, y1, area });
                 }
             }
             out.boxes[id as usize - 1].join(&painted);
@@ -213,11 +226,10 @@ impl Painter {
 
 /// Writes `id` where bits are set and 0 elsewhere: what is to the right comes later.
 #[inline(always)]
-fn write(row: &mut [u32], id: u32, bits: u64) {
+fn write<S: Simd>(simd: S, row: &mut [u32], id: u32, bits: u64) {
     if let Some(row) = row.first_chunk_mut::<LANES>() {
-        for (i, pixel) in row.iter_mut().enumerate() {
-            *pixel = if bits >> i & 1 == 1 { id } else { 0 };
-        }
+        let (id, none) = (u32x16::splat(simd, id), u32x16::splat(simd, 0));
+        mask32x16::from_bitmask(simd, bits).select(id, none).store_slice(row);
     } else {
         for (i, pixel) in row.iter_mut().enumerate() {
             *pixel = if bits >> i & 1 == 1 { id } else { 0 };
