@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::image::Image;
-use crate::simd::{Level, Simd, dispatch, f32x8, prelude::*};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use crate::stage::coarse::CELL;
 use crate::stage::saliency::AttentionScene;
 use crate::stage::saliency::flow::Flow;
@@ -42,10 +42,10 @@ type Normal = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type Unknowns = SVector<f64, UNKNOWNS>;
 
 /// Blocks whose equations stand side by side.
-const LANES: usize = 8;
+const LANES: usize = 16;
 type Lanes = [f32; LANES];
 
-/// Equations of eight blocks: the shift that each has for each unknown at 1,
+/// Equations of sixteen blocks: the shift that each has for each unknown at 1,
 /// in cells. What is left over in the last ones has firmness 0.
 #[derive(Clone, Copy, Debug, Default)]
 struct Equations {
@@ -136,7 +136,7 @@ impl EgoMotion {
         let rank = ((1.0 - MOVERS) * (self.ranked.len() - 1) as f32) as u32;
         self.ranked.resize(self.ranked.len().next_multiple_of(LANES), u32::MAX);
         let ranked = self.ranked.as_chunks::<LANES>().0;
-        let now = dispatch!(self.level, _simd => ranked_at(ranked, rank));
+        let now = dispatch!(self.level, simd => ranked_at(simd, ranked, rank));
         self.most = now.max(held + (1.0 - HELD) * now);
         upsample(self.level, &self.blocks, scene.cells.gray.size(), &mut self.motion);
         true
@@ -211,7 +211,7 @@ impl EgoMotion {
         self.ranked.resize(LANES * self.equations.len(), 0);
         let Self { level, equations, residuals, ranked, .. } = self;
         let ranked = ranked.as_chunks_mut::<LANES>().0;
-        let middle = dispatch!(*level, _simd => {
+        let middle = dispatch!(*level, simd => {
             let mut firm = [0; LANES];
             for ((e, residuals), out) in equations.iter().zip(residuals.iter()).zip(&mut *ranked) {
                 for i in 0..LANES {
@@ -221,7 +221,7 @@ impl EgoMotion {
                     firm[i] += u32::from(is_firm);
                 }
             }
-            ranked_at(ranked, firm.iter().sum::<u32>() / 2)
+            ranked_at(simd, ranked, firm.iter().sum::<u32>() / 2)
         });
         RAYLEIGH * middle
     }
@@ -231,17 +231,17 @@ impl EgoMotion {
 /// their bits: those have the same order. Bit by bit it is asked how many are
 /// smaller, which takes less time than to sort them.
 #[inline(always)]
-fn ranked_at(values: &[[u32; LANES]], rank: u32) -> f32 {
+fn ranked_at<S: Simd>(simd: S, values: &[[u32; LANES]], rank: u32) -> f32 {
+    let (none, one) = (u32x16::splat(simd, 0), u32x16::splat(simd, 1));
     let mut value = 0;
     for bit in (0..31).rev() {
         let above = value | 1 << bit;
-        let mut smaller = [0; LANES];
+        let mut smaller = none;
         for values in values {
-            for i in 0..LANES {
-                smaller[i] += u32::from(values[i] < above);
-            }
+            let values = u32x16::load_array_ref(simd, values);
+            smaller += values.simd_lt(above).select(one, none);
         }
-        if smaller.iter().sum::<u32>() <= rank {
+        if smaller.as_slice().iter().sum::<u32>() <= rank {
             value = above;
         }
     }
@@ -250,8 +250,8 @@ fn ranked_at(values: &[[u32; LANES]], rank: u32) -> f32 {
 
 /// In lanes: one sum would wait for itself.
 fn sum(values: &[f32]) -> f32 {
-    let mut sums = [0.0; 2 * LANES];
-    let (whole, rest) = values.as_chunks::<{ 2 * LANES }>();
+    let mut sums = [0.0; LANES];
+    let (whole, rest) = values.as_chunks::<LANES>();
     for values in whole {
         for (sum, value) in sums.iter_mut().zip(values) {
             *sum += value;
@@ -274,11 +274,11 @@ impl Equations {
     /// Lengths of what is left of the shifts.
     #[inline(always)]
     fn residuals<S: Simd>(&self, simd: S, found: &[f32; UNKNOWNS], out: &mut Lanes) {
-        let mut squares = f32x8::splat(simd, 0.0);
+        let mut squares = f32x16::splat(simd, 0.0);
         for (row, shift) in self.rows.iter().zip(&self.shift) {
-            let mut left = f32x8::from_slice(simd, shift);
+            let mut left = f32x16::from_slice(simd, shift);
             for (coefficients, found) in row.iter().zip(found) {
-                left -= f32x8::from_slice(simd, coefficients) * *found;
+                left -= f32x16::from_slice(simd, coefficients) * *found;
             }
             squares += left * left;
         }
