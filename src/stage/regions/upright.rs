@@ -4,19 +4,21 @@ mod paint;
 mod post;
 mod shrink;
 
+use std::ops::Range;
+
 use super::RegionSource;
 use super::candidates::Candidates;
-use super::runs::run;
+use super::runs::{Spans, edge_words, find_edges};
 use super::trim::{NARROW_M, Trim};
 use crate::image::Image;
 use crate::perception::Rejections;
-use crate::simd::Level;
+use crate::simd::{LANES, Level, Simd, dispatch, padded, prelude::*, u8x32};
 use crate::stage::ground::Plane;
-use crate::stage::roi::bits::BitMask;
+use crate::stage::roi::bits::{BitMask, first_set, last_set};
 use crate::stage::standing::{HIGH, Standing, Things, WIDE, size_scale};
 use paint::Painter;
 use post::{Posts, Stump};
-use shrink::shrink;
+use shrink::{even_bits, shrink};
 
 /// Share of a thing's cells that must be salient.
 const LEAST_SALIENT: f32 = 0.3;
@@ -33,6 +35,10 @@ pub struct Upright {
     fine: BitMask,
     salient: Vec<u32>,
     number: Vec<u32>,
+    /// Per row of cells the edges between things.
+    edges: Vec<u64>,
+    /// Of a row, the salient cells.
+    bits: Vec<u64>,
 }
 
 impl Upright {
@@ -48,6 +54,8 @@ impl Upright {
             fine: BitMask::default(),
             salient: Vec::new(),
             number: Vec::new(),
+            edges: Vec::new(),
+            bits: Vec::new(),
         }
     }
 
@@ -79,21 +87,25 @@ impl Upright {
         self.salient.resize(self.things.list.len(), 0);
         self.number.clear();
         self.number.resize(self.things.list.len(), 0);
-        for cy in 0..self.things.ids.height() {
-            let pixels = salient.row((cy * HIGH + HIGH / 2).min(salient.height() - 1));
-            let row = self.things.ids.row(cy);
-            let mut next = 0;
-            while let Some((id, cells)) = run(row, next) {
-                next = cells.end;
-                self.number[id as usize - 1] += cells.len() as u32;
-                // The right pixel of a cell, where there is one.
-                let pixels = &pixels[cells.start * WIDE..(cells.end * WIDE).min(pixels.len())];
-                let (pairs, cut) = pixels.as_chunks::<WIDE>();
-                let salient: u32 = pairs.iter().map(|pair| u32::from(pair[WIDE / 2] != 0)).sum();
-                let cut = cut.last().is_some_and(|pixel| *pixel != 0);
-                self.salient[id as usize - 1] += salient + u32::from(cut);
+        let words = edge_words(self.things.ids.width());
+        self.edges.resize(self.things.ids.height() * words, 0);
+        self.bits.resize(words, 0);
+        let Self { level, things, salient: counts, number, edges, bits, .. } = self;
+        dispatch!(*level, simd => {
+            for ((cy, row), edges) in things.ids.rows().enumerate().zip(edges.chunks_exact_mut(words)) {
+                find_edges(simd, row, edges);
+                let Some(first) = first_set(edges, 0) else { continue };
+                let end = last_set(edges, row.len() + 1).unwrap_or(first);
+                let pixels = salient.row((cy * HIGH + HIGH / 2).min(salient.height() - 1));
+                right_pixels(simd, pixels, first..end, bits);
+                for cells in Spans::new(edges) {
+                    if let Some(thing) = row[cells.start].checked_sub(1) {
+                        number[thing as usize] += cells.len() as u32;
+                        counts[thing as usize] += count_set(bits, cells);
+                    }
+                }
             }
-        }
+        });
         let mut count = 0;
         for (number, &salient) in self.number.iter_mut().zip(&self.salient) {
             let chosen = salient as f32 >= LEAST_SALIENT * *number as f32 && salient > 0;
@@ -103,12 +115,12 @@ impl Upright {
         if count as usize == self.number.len() {
             return self.number.len();
         }
-        for cy in 0..self.things.ids.height() {
+        for (cy, edges) in (0..self.things.ids.height()).zip(self.edges.chunks_exact(words)) {
             let row = self.things.ids.row_mut(cy);
-            let mut next = 0;
-            while let Some((id, cells)) = run(row, next) {
-                next = cells.end;
-                row[cells].fill(self.number[id as usize - 1]);
+            for cells in Spans::new(edges) {
+                if let Some(thing) = row[cells.start].checked_sub(1) {
+                    row[cells].fill(self.number[thing as usize]);
+                }
             }
         }
         count as usize
@@ -141,6 +153,65 @@ impl Upright {
                 metre_px: source.rig.focal_px() as f32 / depth,
             };
             self.posts.run(&stump, id, out);
+        }
+    }
+}
+
+/// Sets the bits of those of `cells`, and of others, whose right pixel is not 0; the last
+/// column may have none, and its left one tells.
+#[inline(always)]
+fn right_pixels<S: Simd>(simd: S, pixels: &[u8], cells: Range<usize>, bits: &mut [u64]) {
+    bits.fill(0);
+    let first = cells.start * WIDE / LANES * LANES;
+    for x in (first..pixels.len().min(cells.end * WIDE)).step_by(LANES) {
+        let pixels: u8x32<S> = padded(simd, pixels, x, 0);
+        let set = !pixels.simd_eq(0).to_bitmask() >> 1;
+        let cell = x / WIDE;
+        bits[cell / 64] |= even_bits(set) << (cell % 64);
+    }
+    if let Some(last) = pixels.as_chunks::<WIDE>().1.first() {
+        let cell = pixels.len() / WIDE;
+        bits[cell / 64] |= u64::from(*last != 0) << (cell % 64);
+    }
+}
+
+/// How many bits of a range are set.
+#[inline(always)]
+fn count_set(bits: &[u64], Range { start, end }: Range<usize>) -> u32 {
+    let mut count = 0;
+    let words = start / 64..end.div_ceil(64);
+    for (index, word) in words.clone().zip(&bits[words]) {
+        let from = u64::MAX << start.saturating_sub(index * 64);
+        let to = u64::MAX >> ((index + 1) * 64).saturating_sub(end);
+        count += (word & from & to).count_ones();
+    }
+    count
+}
+
+// A cell has a left and a right pixel.
+const _: () = assert!(WIDE == 2);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd;
+
+    #[test]
+    fn the_right_pixel_of_a_cell_tells() {
+        for width in [1, 2, 3, 31, 32, 33, 64, 127, 128, 129, 260] {
+            let pixels: Vec<u8> = (0..width).map(|x| if x * x % 7 < 3 { 255 } else { 0 }).collect();
+            let cells: Vec<bool> =
+                pixels.chunks(2).map(|cell| cell.last().is_some_and(|pixel| *pixel != 0)).collect();
+            for level in simd::available() {
+                for start in 0..cells.len() {
+                    for end in start + 1..=cells.len() {
+                        let mut bits = vec![u64::MAX; edge_words(cells.len())];
+                        dispatch!(level, simd => right_pixels(simd, &pixels, start..end, &mut bits));
+                        let expected = cells[start..end].iter().filter(|set| **set).count();
+                        assert_eq!(count_set(&bits, start..end) as usize, expected);
+                    }
+                }
+            }
         }
     }
 }

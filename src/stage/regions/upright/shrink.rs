@@ -82,8 +82,13 @@ impl Row<'_> {
 fn cells_of<S: Simd>(simd: S, upper: u8x32<S>, lower: u8x32<S>) -> u64 {
     let any = upper | lower;
     let bits = !any.simd_eq(u8x32::splat(simd, 0)).to_bitmask();
-    // The even bits move together.
-    let mut bits = (bits | bits >> 1) & 0x5555_5555;
+    even_bits(bits | bits >> 1)
+}
+
+/// The even ones of 32 bits, side by side.
+#[inline(always)]
+pub const fn even_bits(bits: u64) -> u64 {
+    let mut bits = bits & 0x5555_5555;
     bits = (bits | bits >> 1) & 0x3333_3333;
     bits = (bits | bits >> 2) & 0x0f0f_0f0f;
     bits = (bits | bits >> 4) & 0x00ff_00ff;
