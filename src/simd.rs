@@ -60,6 +60,17 @@ pub(crate) fn padded<S: Simd, V: SimdBase<S>>(
     values
 }
 
+/// Writes those of the values from `at` on that are inside a row.
+#[inline(always)]
+pub(crate) fn store_inside<S: Simd, V: SimdBase<S>>(row: &mut [V::Element], at: usize, values: V) {
+    let row = &mut row[at..];
+    if row.len() >= V::LEN {
+        values.store_slice(&mut row[..V::LEN]);
+    } else {
+        row.copy_from_slice(&values.as_slice()[..row.len()]);
+    }
+}
+
 /// The 32 bytes from `at`.
 #[inline(always)]
 pub(crate) fn load<S: Simd>(simd: S, bytes: &[u8], at: usize) -> u8x32<S> {

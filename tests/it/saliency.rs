@@ -187,7 +187,6 @@ fn the_quarter_size_view_holds_means() {
         shrink_view(simd::detect(), &left, &mut cells);
         let small = size.divided_by(4);
         assert_eq!(cells.gray, plain_view::box_mean(&left.gray, 4, small), "{size}");
-        assert_eq!(cells.gradient, plain_view::gradient(&cells.gray));
         for c in 0..3 {
             let expected = plain_view::box_mean(&plain_view::channel(&left.rgb, c), 4, small);
             assert_eq!(plain_view::channel(&cells.rgb, c), expected, "{size}");

@@ -138,21 +138,30 @@ impl Draws {
 /// Weighted least squares of a plane: its normal equations.
 #[derive(Default)]
 pub(in crate::stage) struct Fit {
-    normal: Matrix3<f64>,
-    right: Vector3<f64>,
+    /// Sums of v², u v, v, u², u and 1, and of v d, u d and d.
+    normal: [f64; 6],
+    right: [f64; 3],
 }
 
 impl Fit {
+    #[inline]
     pub(in crate::stage) fn add(&mut self, cell: Measured, weight: f32) {
-        let weight = f64::from(weight);
-        let row = Vector3::new(f64::from(cell.v), f64::from(cell.u), 1.0);
-        self.normal += weight * row * row.transpose();
-        self.right += weight * f64::from(cell.d) * row;
+        let (u, v, d) = (f64::from(cell.u), f64::from(cell.v), f64::from(cell.d));
+        let n = f64::from(weight);
+        let (wu, wv) = (n * u, n * v);
+        for (sum, term) in self.normal.iter_mut().zip([wv * v, wv * u, wv, wu * u, wu, n]) {
+            *sum += term;
+        }
+        for (sum, term) in self.right.iter_mut().zip([wv * d, wu * d, n * d]) {
+            *sum += term;
+        }
     }
 
     /// a, b and c; `None` when the cells tell none.
     pub(in crate::stage) fn solve(&self) -> Option<[f32; 3]> {
-        let solution = self.normal.try_inverse()? * self.right;
+        let [vv, uv, v, uu, u, n] = self.normal;
+        let normal = Matrix3::new(vv, uv, v, uv, uu, u, v, u, n);
+        let solution = normal.try_inverse()? * Vector3::from(self.right);
         Some([solution.x as f32, solution.y as f32, solution.z as f32])
     }
 }

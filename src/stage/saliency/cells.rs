@@ -4,13 +4,11 @@ use crate::image::Size;
 use crate::perception::View;
 use crate::simd::Level;
 use crate::stage::coarse::CELL;
-use crate::stage::preprocess::gradient::gradient;
 use crate::stage::preprocess::luma::spread;
 use crate::stage::preprocess::resize::box_mean;
 
 /// Means of `view` over [`CELL`] x [`CELL`] pixels, rounded to nearest. Cells
-/// that the image's edge cuts average the pixels they have. The gradient is
-/// that of the small gray image.
+/// that the image's edge cuts average the pixels they have. Without a gradient.
 ///
 /// A view without colours gives one without colours.
 pub fn shrink_view(level: Level, view: &View, out: &mut View) {
@@ -28,5 +26,6 @@ pub fn shrink_view(level: Level, view: &View, out: &mut View) {
     } else {
         out.rgb.resize(Size::default());
     }
-    gradient(level, &out.gray, &mut out.gradient);
+    // No cue asks for it.
+    out.gradient.resize(Size::default());
 }

@@ -1,7 +1,7 @@
 //! What stands is one surface from its foot to its top.
 
 use crate::image::Image;
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, store_inside};
 use crate::stage::ground::{Plane, cell_centre};
 use crate::stage::saliency::lateral;
 
@@ -70,19 +70,9 @@ impl Columns {
         });
         self.clear_state(size.width);
         let Self { level, part, mean, state: [carried, inside, ..] } = self;
-        dispatch!(*level, _simd => {
+        dispatch!(*level, simd => {
             for y in 0..size.height {
-                let cells = part.row(y).iter().zip(mean.row(y)).zip(disparity.row_mut(y));
-                for (((&part, &mean), d), (carried, inside)) in
-                    cells.zip(carried.iter_mut().zip(inside.iter_mut()))
-                {
-                    // What may stay is read before it is asked for: no branches.
-                    let (so_far, own) = (*carried, *d);
-                    let surface = if *inside > 0.0 { so_far } else { mean };
-                    *carried = surface;
-                    *d = if part > OUTSIDE { surface } else { own };
-                    *inside = if part > BASE { 1.0 } else { 0.0 };
-                }
+                hand_down(simd, part.row(y), mean.row(y), disparity.row_mut(y), carried, inside);
             }
         });
     }
@@ -102,16 +92,9 @@ impl Columns {
         let size = disparity.size();
         self.clear_state(size.width);
         let Self { level, part, mean, state: [sum, count, ..] } = self;
-        dispatch!(*level, _simd => {
+        dispatch!(*level, simd => {
             for y in (0..size.height).rev() {
-                let cells = part.row(y).iter().zip(cue.row(y)).zip(mean.row_mut(y));
-                for (((&part, &cue), mean), (sum, count)) in
-                    cells.zip(sum.iter_mut().zip(count.iter_mut()))
-                {
-                    *sum = if part > BASE { *sum + cue } else { cue };
-                    *count = if part > BASE { *count + 1.0 } else { 1.0 };
-                    *mean = *sum / *count;
-                }
+                average(simd, part.row(y), cue.row(y), mean.row_mut(y), sum, count);
             }
         });
         self.clear_state(size.width);
@@ -134,8 +117,56 @@ impl Columns {
     fn clear_state(&mut self, width: usize) {
         for buffer in &mut self.state {
             buffer.clear();
-            buffer.resize(width, 0.0);
+            buffer.resize(width.next_multiple_of(LANES), 0.0);
         }
+    }
+}
+
+/// Columns that are taken at once.
+const LANES: usize = 16;
+
+/// Puts on the cells of surfaces the value of their highest one, which is `carried`
+/// down, where the row above is `inside` of a surface that goes on.
+#[inline(always)]
+fn hand_down<S: Simd>(
+    simd: S,
+    part: &[f32],
+    mean: &[f32],
+    disparity: &mut [f32],
+    carried: &mut [f32],
+    inside: &mut [f32],
+) {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    for x in (0..disparity.len()).step_by(LANES) {
+        let part: f32x16<S> = padded(simd, part, x, OUTSIDE);
+        let own: f32x16<S> = padded(simd, disparity, x, 0.0);
+        let goes_on = padded::<S, f32x16<S>>(simd, inside, x, 0.0).simd_gt(0.0);
+        let surface = goes_on.select(padded(simd, carried, x, 0.0), padded(simd, mean, x, 0.0));
+        store_inside(disparity, x, part.simd_gt(OUTSIDE).select(surface, own));
+        store_inside(carried, x, surface);
+        store_inside(inside, x, part.simd_gt(BASE).select(one, zero));
+    }
+}
+
+/// Means of `cue` over surfaces, from their lowest cells up.
+#[inline(always)]
+fn average<S: Simd>(
+    simd: S,
+    part: &[f32],
+    cue: &[f32],
+    mean: &mut [f32],
+    sum: &mut [f32],
+    count: &mut [f32],
+) {
+    let one = f32x16::splat(simd, 1.0);
+    for x in (0..mean.len()).step_by(LANES) {
+        let cue: f32x16<S> = padded(simd, cue, x, 0.0);
+        let goes_on = padded::<S, f32x16<S>>(simd, part, x, OUTSIDE).simd_gt(BASE);
+        let sums = goes_on.select(padded::<S, f32x16<S>>(simd, sum, x, 0.0) + cue, cue);
+        let counts = goes_on.select(padded::<S, f32x16<S>>(simd, count, x, 0.0) + one, one);
+        store_inside(mean, x, sums / counts);
+        store_inside(sum, x, sums);
+        store_inside(count, x, counts);
     }
 }
 

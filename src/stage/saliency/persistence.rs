@@ -2,7 +2,7 @@
 
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, store_inside, u32x16};
 use crate::stage::saliency::PreviousFrame;
 use crate::stage::saliency::flow::Flow;
 
@@ -113,20 +113,9 @@ fn smooth<S: Simd>(
             let place = Place::new(size, here + dx, dy + y as f32);
             let now: f32x16<S> = padded(simd, attention.row(y), x, 0.0);
             let [past, attended] = place.of(simd, past);
-            store(attention.row_mut(y), x, now + trust * share * (past - now));
-            store(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
+            store_inside(attention.row_mut(y), x, now + trust * share * (past - now));
+            store_inside(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
         }
-    }
-}
-
-/// Writes those of the values from `x` on that are inside a row.
-#[inline(always)]
-fn store<S: Simd>(row: &mut [f32], x: usize, values: f32x16<S>) {
-    let row = &mut row[x..];
-    if let Some(row) = row.first_chunk_mut::<LANES>() {
-        values.store_slice(row);
-    } else {
-        row.copy_from_slice(&values.as_slice()[..row.len()]);
     }
 }
 
