@@ -12,6 +12,7 @@ use salient_stereo::image::{Image, Picture, Size};
 use salient_stereo::perception::{Perception, StereoFrame};
 use salient_stereo::pipeline::Pipeline;
 use salient_stereo::simd;
+use salient_stereo::stage::ground::GroundState;
 use salient_stereo::stamp::Stamp;
 use serde_json::json;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
@@ -34,20 +35,26 @@ fn texture(x: usize, y: usize, seed: u32) -> u8 {
     (h >> 24) as u8
 }
 
-/// A far, dull background and three bright boxes that move and come nearer.
-fn frame(index: usize, rig: &Arc<StereoRig>) -> StereoFrame {
+/// Row of the horizon of a road.
+const HORIZON: usize = 60;
+
+/// A far, dull background and three bright boxes that move and come nearer; on a `road`
+/// they stand on it.
+fn frame(index: usize, road: bool, rig: &Arc<StereoRig>) -> StereoFrame {
     let view = |is_right: bool| {
         Image::from_fn(SIZE, |x, y| {
             for (k, (x0, y0)) in [(40, 40), (130, 60), (230, 50)].into_iter().enumerate() {
                 let disparity = 12 + 6 * k + index % 4;
                 let shift = if is_right { disparity } else { 0 };
-                let (bx, by) = (x0 + 2 * index, y0 + index);
+                let y0 = if road { HORIZON + 5 * disparity - 40 } else { y0 + index };
+                let (bx, by) = (x0 + 2 * index, y0);
                 if (bx..bx + 40).contains(&(x + shift)) && (by..by + 40).contains(&y) {
                     let v = texture(x + shift - bx, y - by, k as u32);
                     return [200_u8.saturating_add(v / 5), v / 2, 30 * k as u8];
                 }
             }
-            let shift = if is_right { 3 } else { 0 };
+            let far = if road { y.saturating_sub(HORIZON) / 5 } else { 3 };
+            let shift = if is_right { far } else { 0 };
             let v = 60 + texture(x + shift, y, 99) / 8;
             [v, v, v]
         })
@@ -72,7 +79,8 @@ fn a_warm_pipeline_allocates_nothing() {
         )
         .unwrap(),
     );
-    let frames: Vec<_> = (0..12).map(|i| frame(i, &rig)).collect();
+    let frames =
+        [false, true].map(|road| (0..12).map(|i| frame(i, road, &rig)).collect::<Vec<_>>());
 
     let modes = ["scene", "paper", "frequency_tuned", "spectral_residual", "full_frame"];
     let mut variants: Vec<_> = modes.iter().map(|m| vec![("saliency.mode", json!(m))]).collect();
@@ -88,8 +96,10 @@ fn a_warm_pipeline_allocates_nothing() {
     ]);
     variants.push(vec![("rectify", json!(true)), ("stereo.saliency_weight", json!(1.0))]);
 
-    let mut regions_seen = 0;
-    for variant in variants {
+    let mut regions_seen = [0, 0];
+    let runs = variants.into_iter().map(|variant| (0, variant));
+    for (road, variant) in runs.chain([(1, vec![("saliency.mode", json!("scene"))])]) {
+        let frames = &frames[road];
         let config = Config::default()
             .with_all([("saliency.threshold", json!(0.3)), ("stereo.disparity_range", json!(64))])
             .and_then(|c| c.with_all(variant.clone()))
@@ -105,14 +115,14 @@ fn a_warm_pipeline_allocates_nothing() {
             for round in 0..MOST_ROUNDS {
                 pipeline.reset();
                 let before = Region::new(GLOBAL);
-                for frame in &frames {
+                for frame in frames {
                     pipeline.process(frame, &mut perception);
                 }
                 let change = before.change();
                 allocated = change.allocations + change.reallocations;
                 quiet_rounds = if allocated == 0 { quiet_rounds + 1 } else { 0 };
                 if round == 0 {
-                    regions_seen += perception.regions.len();
+                    regions_seen[road] += perception.regions.len();
                 }
                 if quiet_rounds == QUIET_ROUNDS {
                     break;
@@ -127,6 +137,8 @@ fn a_warm_pipeline_allocates_nothing() {
             "{allocated} allocations in the last {} frames with {variant:?}",
             frames.len()
         );
+        let ground = perception.ground == GroundState::Measured;
+        assert_eq!(ground, road == 1, "{variant:?}");
     }
-    assert!(regions_seen > 0, "the scene has regions to allocate for");
+    assert!(regions_seen.iter().all(|n| *n > 0), "the scenes have regions to allocate for");
 }

@@ -51,6 +51,8 @@ pub struct Standing {
     columns: Columns,
     join: Join,
     split: Split,
+    /// The left and the right half of each thing.
+    halves: Vec<[Thing; 2]>,
     thing: Vec<u32>,
     rows: Vec<u32>,
     seen: Vec<u32>,
@@ -65,6 +67,7 @@ impl Standing {
             columns: Columns::new(level),
             join: Join::default(),
             split: Split::default(),
+            halves: Vec::new(),
             thing: Vec::new(),
             rows: Vec::new(),
             seen: Vec::new(),
@@ -86,7 +89,7 @@ impl Standing {
         let view = View::new(size_scale(plane), rig);
         self.join.run(disparity, &self.columns, &view);
         self.collect(disparity, &view, least_cells, out);
-        self.part(&view, least_cells, &mut out.list);
+        self.divide(&view, least_cells, &mut out.list);
         self.paint(disparity, out);
     }
 
@@ -113,7 +116,7 @@ impl Standing {
             let thing = out.list[i];
             let plate = thing.is_plate();
             let (large, stands) = (thing.is_large(scale, least_cells), plate || thing.stands());
-            let background = thing.is_building() || thing.is_behind();
+            let background = thing.is_building() || thing.is_behind(view);
             out.floating += u32::from(large && !stands);
             out.background += u32::from(large && stands && background);
             if large && stands && !background {
@@ -131,23 +134,40 @@ impl Standing {
         }
     }
 
-    /// Makes two of things that are rather two; the right one comes last.
-    fn part(&mut self, view: &View, least_cells: u32, list: &mut Vec<Thing>) {
-        let Self { columns, thing, split, seen: right, .. } = self;
-        let cuts = split.run(&columns.segments, thing, list.len(), view, least_cells);
-        right.clear();
-        for (i, cut) in cuts.iter().enumerate() {
-            if cut.is_some() {
-                list[i] = Thing::EMPTY;
-                list.push(Thing::EMPTY);
-            }
-            right.push(list.len() as u32);
-        }
-        for (s, thing) in columns.segments.iter().zip(thing).filter(|(_, thing)| **thing != 0) {
+    /// Makes two of things that are rather two, if both would be things; the right one
+    /// comes last.
+    fn divide(&mut self, view: &View, least_cells: u32, list: &mut Vec<Thing>) {
+        let Self { columns, thing: things, split, halves, .. } = self;
+        let cuts = split.run(&columns.segments, things, list, view, least_cells);
+        halves.clear();
+        halves.resize(list.len(), [Thing::EMPTY; 2]);
+        let segments = || columns.segments.iter();
+        for (s, thing) in segments().zip(&*things).filter(|(_, thing)| **thing != 0) {
             let index = *thing as usize - 1;
             if let Some(cut) = cuts[index] {
-                *thing = if s.x < cut { *thing } else { right[index] };
-                list[*thing as usize - 1].add(s, view);
+                halves[index][usize::from(s.x >= cut)].add(s, view);
+            }
+        }
+        // The numbers of the right ones.
+        self.seen.clear();
+        for (index, halves) in halves.iter_mut().enumerate() {
+            let is_thing = |half: &Thing| {
+                half.is_large(view.scale, least_cells) && half.stands() && !half.is_building()
+            };
+            let two = cuts[index].is_some() && halves.iter().all(is_thing);
+            if two {
+                for half in &mut *halves {
+                    half.narrow = half.is_narrow();
+                }
+                list[index] = halves[0];
+                list.push(halves[1]);
+            }
+            self.seen.push(if two { list.len() as u32 } else { 0 });
+        }
+        for (s, thing) in segments().zip(things).filter(|(_, thing)| **thing != 0) {
+            let index = *thing as usize - 1;
+            if self.seen[index] != 0 && cuts[index].is_some_and(|cut| s.x >= cut) {
+                *thing = self.seen[index];
             }
         }
     }

@@ -228,36 +228,57 @@ fn the_side_of_a_car_that_recedes_is_a_part_of_it() {
     assert!(near < rear as f32 + 0.2 && far > front as f32 - 0.7, "{near} {far}");
 }
 
-/// A street with surfaces 1.5 m high at the right, of which `depth` tells how far away
-/// they are in each direction from the axis (lateral metres per metre).
-fn receding(depth: impl Fn(f64) -> Option<f64>) -> Image<f32> {
+/// A street with surfaces of this height at the right, of which `depth` tells how far
+/// away they are in each direction from the axis (lateral metres per metre).
+fn receding(height: f64, depth: impl Fn(f64) -> Option<f64>) -> Image<f32> {
     let street = upright(&[]);
     Image::from_fn(street.size(), |x, y| {
         let (u, v) = standing::centre(x, y);
         let z = depth((f64::from(u) - 320.0) / F);
-        z.filter(|z| (0.0..1.5).contains(&(HEIGHT - (f64::from(v) - HORIZON) * z / F)))
+        z.filter(|z| (0.0..height).contains(&(HEIGHT - (f64::from(v) - HORIZON) * z / F)))
             .map_or(street.get(x, y), |z| (F * BASELINE / z) as f32)
     })
 }
 
+/// Rear and side of a vehicle whose side is 3.5 m beside the camera, in one direction.
+fn vehicle(rear: f64, length: f64, slope: f64) -> Option<f64> {
+    let side = 3.5 / slope;
+    let seen = slope > 0.0 && slope <= 5.2 / rear && side < rear + length;
+    seen.then_some(side.max(rear))
+}
+
 #[test]
 fn cars_nose_to_tail_are_two_and_a_bus_is_one() {
-    // Rears and sides of cars 4.5 m long, 0.5 m apart, 3.5 m beside the camera.
-    let car = |rear: f64, slope: f64| {
-        let side = 3.5 / slope;
-        let seen = slope <= 5.2 / rear && side < rear + 4.5;
-        seen.then_some(side.max(rear))
-    };
-    let one = things(&receding(|slope| car(20.0, slope))).list;
+    // Cars are 4.5 m long, and 0.5 m apart.
+    let car = |rear: f64, slope: f64| vehicle(rear, 4.5, slope);
+    let one = things(&receding(1.5, |slope| car(20.0, slope))).list;
     assert_eq!(one.len(), 1, "{one:?}");
-    let two = things(&receding(|slope| car(20.0, slope).or_else(|| car(25.0, slope)))).list;
+    let two = things(&receding(1.5, |slope| car(20.0, slope).or_else(|| car(25.0, slope)))).list;
     assert_eq!(two.len(), 2, "{two:?}");
     let far = |i: usize| two[i].depth_m[1];
     assert!(far(0).min(far(1)) < 25.0 && far(0).max(far(1)) > 28.0, "{two:?}");
-    // The side of a bus is as deep as two cars.
-    let bus = |slope: f64| Some(3.5 / slope).filter(|z| (18.0..30.0).contains(z));
-    let bus = things(&receding(bus)).list;
-    assert_eq!(bus.len(), 1, "{bus:?}");
+    // The side of a bus is as deep as two cars, with its rear in view or not.
+    for rear in [12.0, 18.0, 25.0] {
+        let bus = things(&receding(3.0, |slope| vehicle(rear, 12.0, slope))).list;
+        assert_eq!(bus.len(), 1, "{bus:?}");
+    }
+    let fence = |slope: f64| Some(3.5 / slope).filter(|z| (18.0..30.0).contains(z));
+    let fence = things(&receding(1.5, fence)).list;
+    assert_eq!(fence.len(), 1, "{fence:?}");
+}
+
+#[test]
+fn nothing_beside_a_thing_speaks_for_it_far_away_only() {
+    for (distance, found) in [(10.0, 0), (30.0, 1)] {
+        let seen = upright(&[[-0.9, 0.9, 0.0, 1.5, distance]]);
+        let half = 0.9 / distance * F;
+        let alone = Image::from_fn(seen.size(), |x, y| {
+            let (u, _) = standing::centre(x, y);
+            if f64::from(u - 320.0).abs() < half { seen.get(x, y) } else { f32::NAN }
+        });
+        assert_eq!(things(&alone).list.len(), found, "{distance}");
+        assert_eq!(things(&seen).list.len(), 1, "{distance}");
+    }
 }
 
 #[test]

@@ -15,10 +15,6 @@ const MAX_WIDTH: usize = 1400;
 /// Quality of the camera images.
 const JPEG_QUALITY: u8 = 80;
 
-/// Pixels per cell of the saliency layer along each axis: attention is made at
-/// quarter size, more is not in it.
-const SALIENCY_CELL: usize = 4;
-
 /// One frame, compressed.
 #[derive(Clone, Debug)]
 pub struct Kept {
@@ -98,19 +94,11 @@ fn left(perception: &Perception, stride: usize) -> Result<Vec<u8>, picture::Pict
     picture::jpeg(&small, JPEG_QUALITY)
 }
 
-/// Heat whose opacity grows with the attention.
+/// Heat whose opacity grows with the attention, one pixel per cell: more is not in it.
 fn saliency(perception: &Perception) -> Result<Layer, png::EncodingError> {
-    let map = perception.saliency();
-    let size = map.size().divided_by(SALIENCY_CELL);
-    let indices = Image::from_fn(size, |x, y| {
-        let middle = SALIENCY_CELL / 2;
-        let s = map.get_clamped(
-            (x * SALIENCY_CELL + middle) as isize,
-            (y * SALIENCY_CELL + middle) as isize,
-        );
-        // NaN becomes 0 in the conversion.
-        (s.clamp(0.0, 1.0) * 255.0) as u8
-    });
+    let map = &perception.attention;
+    // NaN becomes 0 in the conversion.
+    let indices = Image::from_fn(map.size(), |x, y| (map.get(x, y).clamp(0.0, 1.0) * 255.0) as u8);
     let alpha: Vec<u8> = (0..=255_u32).map(|i| (70 + i * 160 / 255) as u8).collect();
     Layer::encode(&indices, Colormap::Inferno.table(), &alpha)
 }

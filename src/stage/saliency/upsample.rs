@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::image::{Image, Size};
 use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*};
 use crate::stage::coarse::CELL;
@@ -15,17 +13,18 @@ const LANES: usize = 16;
 /// pixel of an image of `size`; outside the outermost cell centres the nearest
 /// value. Cell `i` has its centre at pixel `4 i + 1.5`.
 ///
-/// `cells` must have the size `size.divided_by(CELL)`.
+/// `cells` must have the size `size.divided_by(CELL)`. One thread: outputs ask for it
+/// as well, which have no share in the workers.
 pub fn upsample(level: Level, cells: &Image<f32>, size: Size, out: &mut Image<f32>) {
     out.resize(size);
     if size.is_empty() || cells.size() != size.divided_by(CELL) {
         return;
     }
-    out.pixels_mut().par_chunks_exact_mut(size.width).with_min_len(32).enumerate().for_each(
-        |(y, out)| {
-            dispatch!(level, simd => Rows::at(cells, y).spread(simd, 0..cells.width(), out));
-        },
-    );
+    dispatch!(level, simd => {
+        for (y, out) in out.pixels_mut().chunks_exact_mut(size.width).enumerate() {
+            Rows::at(cells, y).spread(simd, 0..cells.width(), out);
+        }
+    });
 }
 
 /// The rows of cells above and below a row of pixels, and the share of the latter.

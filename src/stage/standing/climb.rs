@@ -28,7 +28,7 @@ const SEGMENT_PART: f32 = 0.1;
 /// Cells of a segment, at least: what is shorter is a mixture of two surfaces at
 /// an edge as a rule, or noise. Of streets half of all segments are.
 const LEAST_CELLS: f32 = 3.0;
-/// Metres from which so many cells are enough: what is far away is no higher than
+/// Metres (of a road scene) from which so many cells are enough: what is far away is no higher than
 /// that, and what two surfaces mix to at an edge is lower.
 const FEW_CELLS: f32 = 2.0;
 const FEW_M: f32 = 0.6;
@@ -43,7 +43,7 @@ struct Climb<S: Simd> {
     /// First column.
     x: usize,
     camera_height_m: f32,
-    /// Height of a row of pixels in metres, times disparity.
+    /// Height of a row of pixels in metres (of a road scene), times disparity.
     row_m: f32,
     /// Row of the highest cell with disparity so far, and whether that is ground;
     /// to begin with the row below the image, which is.
@@ -74,13 +74,14 @@ pub fn climb<S: Simd>(
     plane: &Plane,
     out: &mut Vec<Segment>,
 ) {
+    let scale = size_scale(plane);
     let zero = f32x16::splat(simd, 0.0);
     let none = mask32x16::splat(simd, false);
     let mut state = Climb {
         simd,
         x,
         camera_height_m: plane.camera_height_m,
-        row_m: plane.a * plane.camera_height_m,
+        row_m: plane.a * plane.camera_height_m / scale,
         row: zero + disparity.height() as f32,
         on_ground: !none,
         inside: none,
@@ -95,7 +96,6 @@ pub fn climb<S: Simd>(
         contact: none,
         tall: none,
     };
-    let scale = size_scale(plane);
     let (lowest, contact) = (LOW_M * scale, CONTACT_M * scale);
     let noise = zero + NOISE_PX * plane.camera_height_m;
     let lane = f32x16::from_fn(simd, |i| (i * WIDE) as f32);
@@ -316,7 +316,7 @@ mod tests {
                 }
                 i += 1;
             }
-            let row_m = plane.a * plane.camera_height_m / s.disparity();
+            let row_m = plane.a * plane.camera_height_m / scale / s.disparity();
             let whole = (s.cells + s.upper - s.reach) as f32;
             if s.cells as f32 >= LEAST_CELLS
                 || s.top != Top::Tall && whole >= LEAST_CELLS

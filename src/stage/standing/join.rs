@@ -4,7 +4,7 @@ use super::column::{Columns, Segment, Top};
 use super::{HIGH, WIDE};
 use crate::camera::StereoRig;
 use crate::image::Image;
-use crate::stage::regions::components::tolerance;
+use crate::stage::regions::components::{TOLERANCE_PX, tolerance};
 use crate::stage::regions::union_find::UnionFind;
 
 /// Gap in metres across which segments beside each other are one thing, if
@@ -273,6 +273,12 @@ impl View {
     /// Whether segments with something nearer between them may be one surface.
     fn is_as_deep(&self, s: &Place, t: &Place) -> bool {
         (s.distance - t.distance).abs() <= HIDDEN_STEP_M * self.scale
+    }
+
+    /// Distance from which a step of `step_m` metres (of a road scene) is within the noise
+    /// of the disparity, metres: d Z = Z² / (f B) d d.
+    pub fn distance_of_step(&self, step_m: f32) -> f32 {
+        (step_m * self.scale * self.depth_scale / TOLERANCE_PX).sqrt()
     }
 
     /// Columns from the principal point, pixels.

@@ -1,18 +1,22 @@
 //! Things that are rather two: cars parked nose to tail.
 //!
 //! They hide each other's gaps, and the side of one leads to the rear of the
-//! next. Together they are deeper than a car is long, and their depth falls in
-//! a step; what is one and as deep, a bus, a fence or a wall, recedes evenly.
+//! next. Together they are deeper than a car is long, but no higher than one; what
+//! is one and as deep is higher, as a bus is, or recedes evenly, as a fence does.
 
 use super::column::Segment;
 use super::join::View;
+use super::thing::Thing;
 
 /// Depth from which a thing may be two, metres (of a road scene): the length of
 /// a car; and what the noise of far disparities adds, in parts of the distance.
 const CAR_M: f64 = 4.8;
 const NOISE_PART: f64 = 0.12;
+/// Height up to which it may, metres (of a road scene): a van's. Rear and side of a
+/// bus leave the same residuals as those of two cars.
+const VAN_M: f32 = 2.2;
 /// Share of a thing's cells in each of two, at least.
-const LEAST_PART: f64 = 0.12;
+const LEAST_SHARE: f64 = 0.12;
 /// Squared residuals of two depths in parts of those of a line, at most.
 const MOST_RESIDUAL: f64 = 0.8;
 
@@ -72,26 +76,28 @@ impl Sums {
         self.residual() - slope * slope / spread.max(f64::MIN_POSITIVE)
     }
 
-    /// What is left without another part.
-    fn without(&self, part: &Self) -> Self {
-        Self { n: self.n - part.n, y: self.y - part.y, yy: self.yy - part.yy, ..Self::default() }
+    /// The residuals of what is left without a part.
+    fn residual_without(&self, part: &Self) -> f64 {
+        let (n, y, yy) = (self.n - part.n, self.y - part.y, self.yy - part.yy);
+        yy - y * y / n
     }
 }
 
 impl Split {
-    /// For each of `count` things the column of cells from which on it is another one:
+    /// For each of the things in `list` the column of cells from which on it is another one:
     /// where one depth to the left and one to the right leave smaller squared
     /// residuals of ln d than any other two, and clearly smaller ones than a straight
     /// line over all columns (an upright plane is nearly one). Each part keeps
     /// 12 % of the cells, and `least_cells`. Asked are things deeper than a car
-    /// is long, √12 standard deviations being the depth of what recedes evenly.
+    /// is long, √12 standard deviations being the depth of what recedes evenly, and no
+    /// higher than a van.
     ///
     /// `things` are the numbers of the segments' things, from 1; 0 is none.
     pub fn run(
         &mut self,
         segments: &[Segment],
         things: &[u32],
-        count: usize,
+        list: &[Thing],
         view: &View,
         least_cells: u32,
     ) -> &[Option<u32>] {
@@ -100,10 +106,10 @@ impl Split {
         };
         for sums in [&mut self.whole, &mut self.left] {
             sums.clear();
-            sums.resize(count, Sums::default());
+            sums.resize(list.len(), Sums::default());
         }
         self.best.clear();
-        self.best.resize(count, Best { residual: f64::INFINITY, column: 0, last: u32::MAX });
+        self.best.resize(list.len(), Best { residual: f64::INFINITY, column: 0, last: u32::MAX });
         for (s, thing) in of_things() {
             self.whole[thing].add(s);
         }
@@ -111,9 +117,9 @@ impl Split {
         for (s, thing) in of_things() {
             let (whole, left, best) =
                 (&self.whole[thing], &mut self.left[thing], &mut self.best[thing]);
-            let least = (LEAST_PART * whole.n).max(f64::from(least_cells));
+            let least = (LEAST_SHARE * whole.n).max(f64::from(least_cells));
             if s.x != best.last && left.n >= least && whole.n - left.n >= least {
-                let residual = left.residual() + whole.without(left).residual();
+                let residual = left.residual() + whole.residual_without(left);
                 if residual < best.residual {
                     *best = Best { residual, column: s.x, ..*best };
                 }
@@ -121,14 +127,16 @@ impl Split {
             best.last = s.x;
             left.add(s);
         }
-        let (depth_scale, car) = (f64::from(view.depth_scale), CAR_M * f64::from(view.scale));
+        let (depth_scale, scale) = (f64::from(view.depth_scale), f64::from(view.scale));
         self.cuts.clear();
-        self.cuts.extend(self.whole.iter().zip(&self.best).map(|(whole, best)| {
+        let sums = self.whole.iter().zip(&self.best);
+        self.cuts.extend(list.iter().zip(sums).map(|(thing, (whole, best))| {
             let distance = depth_scale / (whole.y / whole.n).exp();
             let depth = (12.0 * whole.residual() / whole.n).sqrt() * distance;
-            let deep = depth > car + NOISE_PART * distance;
-            (deep && best.residual < MOST_RESIDUAL * whole.residual_of_line())
-                .then_some(best.column)
+            let deep = depth > CAR_M * scale + NOISE_PART * distance;
+            let low = thing.top_m <= VAN_M * view.scale;
+            let two = best.residual < MOST_RESIDUAL * whole.residual_of_line();
+            (deep && low && two).then_some(best.column)
         }));
         &self.cuts
     }

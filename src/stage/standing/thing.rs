@@ -17,11 +17,16 @@ const LEAST_CONTACT: f32 = 0.3;
 /// Share of a thing's sides that must be free of anything nearer.
 const LEAST_FREE: f32 = 0.3;
 
+/// A thing beside which nothing differs is none, where what is so many metres (of a
+/// road scene) behind it would differ.
+const BESIDE_M: f32 = 2.0;
+
 /// Width in metres from which what does not reach the ground may be a plate on a post
 /// too thin to be seen: a traffic sign, which is as large on every road. It is no
 /// wider than a trunk or a pole may be.
 const PLATE_M: f32 = 0.3;
-/// Share of its sides, of so many cells at least, behind which it is farther away.
+/// Share of its sides, of so many cells at least, behind which it is farther away: of a
+/// patch of wall, around which little was measured, fewer are known.
 const PLATE_FREE: f32 = 0.8;
 const PLATE_SIDES: u32 = 6;
 
@@ -92,7 +97,7 @@ impl Thing {
         [self.lateral_m, self.depth_m].map(|[from, to]| to - from)
     }
 
-    fn part(&self, columns: u32) -> f32 {
+    fn share(&self, columns: u32) -> f32 {
         columns as f32 / self.columns as f32
     }
 
@@ -103,7 +108,7 @@ impl Thing {
     }
 
     pub(super) fn stands(&self) -> bool {
-        self.part(self.contacts) >= LEAST_CONTACT
+        self.share(self.contacts) >= LEAST_CONTACT
     }
 
     pub(super) fn is_narrow(&self) -> bool {
@@ -112,7 +117,7 @@ impl Thing {
     }
 
     fn goes_on(&self) -> bool {
-        self.part(self.tall + self.covered) > MOST_TALL
+        self.share(self.tall + self.covered) > MOST_TALL
     }
 
     pub(super) fn is_building(&self) -> bool {
@@ -126,9 +131,12 @@ impl Thing {
         !self.stands() && self.is_narrow() && wide && !self.goes_on() && apart
     }
 
-    pub(super) fn is_behind(&self) -> bool {
+    pub(super) fn is_behind(&self, view: &View) -> bool {
         let sides = self.free + self.hidden;
-        // Far away nothing beside a thing differs enough to tell.
-        if sides == 0 { self.goes_on() } else { (self.free as f32) < LEAST_FREE * sides as f32 }
+        if sides == 0 {
+            // Far away what is beside a thing need not differ enough to tell.
+            return self.goes_on() || self.depth_m[0] < view.distance_of_step(BESIDE_M);
+        }
+        (self.free as f32) < LEAST_FREE * sides as f32
     }
 }
