@@ -5,6 +5,7 @@ pub mod calibration;
 pub mod cdr;
 pub mod convert;
 pub mod diagnostics;
+pub mod echo;
 pub mod endpoint;
 pub mod environment;
 pub mod graph;

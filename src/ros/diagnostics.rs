@@ -2,6 +2,7 @@
 //! `/diagnostics` message made of them once a second.
 
 mod draft;
+mod echo;
 mod report;
 mod section;
 
@@ -11,6 +12,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 pub use report::{Reporter, Surroundings};
+
+use echo::Echo;
 
 use crate::metric::Epipolar;
 use crate::perception::{Rejections, StageTimes};
@@ -63,6 +66,7 @@ pub struct NodeStatus {
     latency: Mutex<Latency>,
     work: Mutex<Work>,
     published: Mutex<BTreeMap<String, u64>>,
+    echo: Mutex<Echo>,
 }
 
 /// Where the time went since the last report.
@@ -144,6 +148,7 @@ impl Default for NodeStatus {
             latency: Mutex::default(),
             work: Mutex::default(),
             published: Mutex::default(),
+            echo: Mutex::default(),
         }
     }
 }
@@ -285,6 +290,17 @@ impl NodeStatus {
         let mut latest: Vec<Epipolar> = lock(&self.alignment).iter().copied().collect();
         latest.sort_by(|a, b| a.error_px.total_cmp(&b.error_px));
         latest.get(latest.len() / 2).copied()
+    }
+
+    /// The node is about to call itself: the number to call with, `None` when
+    /// it need not.
+    pub fn call_echo(&self) -> Option<i32> {
+        lock(&self.echo).call(Instant::now())
+    }
+
+    /// The call of this number came back.
+    pub fn hear_echo(&self, number: i32) {
+        lock(&self.echo).hear(number, Instant::now());
     }
 
     /// Time since the last pair, or since the start when there was none.

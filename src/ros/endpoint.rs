@@ -4,7 +4,7 @@
 #![allow(clippy::large_enum_variant)]
 
 use futures::stream::{BoxStream, StreamExt};
-use ros2_client::{MessageInfo, ReadResult, RmwRequestId, WriteResult, dds};
+use ros2_client::{Gid, MessageInfo, ReadResult, RmwRequestId, WriteResult, dds};
 
 use crate::ros::message::Message;
 #[cfg(feature = "zenoh")]
@@ -30,6 +30,15 @@ impl<M: Message> Publisher<M> {
             Self::Dds(publisher) => publisher.publish(message),
             #[cfg(feature = "zenoh")]
             Self::Zenoh(publisher) => publisher.publish(message),
+        }
+    }
+
+    /// The identity that travels with each of its messages.
+    pub fn gid(&self) -> Gid {
+        match self {
+            Self::Dds(publisher) => publisher.gid(),
+            #[cfg(feature = "zenoh")]
+            Self::Zenoh(publisher) => publisher.gid(),
         }
     }
 }

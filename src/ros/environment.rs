@@ -174,6 +174,19 @@ impl Environment {
     pub(crate) fn only_networks(&self) -> Option<[IpAddr; 1]> {
         self.localhost.then_some([IpAddr::V4(Ipv4Addr::LOCALHOST)])
     }
+
+    /// Whether what a node sends to itself goes the way of its other messages.
+    pub(crate) const fn echoes(&self) -> bool {
+        match &self.middleware {
+            // RustDDS sends to a loopback address only what is for others that
+            // it has heard there.
+            Middleware::Dds(_) => !self.localhost,
+            // The session calls its own subscriptions, past all links: that
+            // echo comes back whatever becomes of them.
+            #[cfg(feature = "zenoh")]
+            Middleware::Zenoh(_) => false,
+        }
+    }
 }
 
 /// What is asked for as to Zenoh.

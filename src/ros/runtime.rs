@@ -29,6 +29,7 @@ use crate::mailbox::Mailbox;
 use crate::output::live::LiveOutput;
 use crate::perception::Perception;
 use crate::ros::diagnostics::NodeStatus;
+use crate::ros::echo::echo;
 use crate::ros::environment::{Environment, Middleware};
 use crate::ros::log;
 use crate::ros::names::Names;
@@ -149,6 +150,15 @@ impl NodeRuntime {
         let pool = worker_pool(config.threads)?;
         let input = LiveInput::subscribe(&mut node, &config)?;
         let output = LiveOutput::advertise(&mut node, Arc::clone(&status))?;
+        let (caller, listener) = match environment.echoes().then(|| echo(&mut node, &status)) {
+            None => (None, None),
+            Some(Ok((caller, listener))) => (Some(caller), Some(listener)),
+            Some(Err(error)) => {
+                // A keystore may not permit its topic.
+                tracing::warn!("a stalled transport will not be noticed: {error}");
+                (None, None)
+            }
+        };
         for topic in node.useless_qos_overrides() {
             tracing::warn!("qos_overrides for {topic} change nothing: the node has no such topic");
         }
@@ -162,6 +172,7 @@ impl NodeRuntime {
             store: Arc::clone(&store),
             clock: Arc::clone(&clock),
             resets: Arc::clone(&resets),
+            echo: listener,
         };
         let services = Services::new(node, targets)?;
         tracing::info!(
@@ -222,6 +233,7 @@ impl NodeRuntime {
         runtime.spawn("pipeline", &ending, move || pool.install(move || worker.run()))?;
         let publisher = work::OutputThread {
             output,
+            echo: caller,
             observer,
             store,
             status,

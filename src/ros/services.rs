@@ -1,5 +1,5 @@
-//! What a node answers: the six parameter services, `~/reset`, and `/clock`
-//! with `use_sim_time`. They run in one thread beside the images.
+//! What a node answers: the six parameter services, `~/reset`, `/clock` with
+//! `use_sim_time`, and its own echo. They run in one thread beside the images.
 //!
 //! `ros2_client` has parameter services and a clock of its own. They describe
 //! nothing, use one service mapping only and subscribe `/clock` with a wrong
@@ -13,6 +13,7 @@ use futures::future::{Either, select};
 use futures::stream::{BoxStream, SelectAll, StreamExt};
 use ros2_client::{ReadResult, RmwRequestId};
 
+use crate::ros::echo::EchoListener;
 use crate::ros::endpoint::{Publisher, Server, Subscription};
 use crate::ros::message::Message;
 use crate::ros::message::rcl_interfaces::{
@@ -38,6 +39,8 @@ pub struct Targets {
     /// Counts the calls of `~/reset`; whoever drives the pipeline looks at it
     /// at each frame boundary.
     pub resets: Arc<AtomicU64>,
+    /// The node's messages to itself, where it sends any.
+    pub echo: Option<EchoListener>,
 }
 
 /// The endpoints of the services.
@@ -65,6 +68,7 @@ enum Event {
     Describe(ReadResult<(RmwRequestId, DescribeParametersRequest)>),
     Reset(ReadResult<(RmwRequestId, TriggerRequest)>),
     Clock(Clock),
+    Echo(i32),
 }
 
 impl Services {
@@ -163,6 +167,9 @@ impl Services {
             });
             events.push(stream.boxed());
         }
+        if let Some(echo) = &self.targets.echo {
+            events.push(echo.numbers().map(Event::Echo).boxed());
+        }
         loop {
             let event = match select(stop, events.next()).await {
                 Either::Left(_) => return None,
@@ -182,6 +189,11 @@ impl Services {
         let store = &self.targets.store;
         match event {
             Event::Clock(Clock { clock }) => self.targets.clock.set(clock.into()),
+            Event::Echo(number) => {
+                if let Some(echo) = &self.targets.echo {
+                    echo.hear(number);
+                }
+            }
             Event::Get(request) => respond(&self.get, request, |request| GetParametersResponse {
                 values: request.names.iter().map(|name| store.get(name)).collect(),
             }),

@@ -1,6 +1,8 @@
 //! The node on a real DDS network, on 127.0.0.1 only: two participants of our
 //! own, one the node, one its peer. Bounded in count and time.
 
+#[cfg(target_os = "linux")]
+mod echo;
 mod faults;
 mod inputs;
 mod lazy;

@@ -200,6 +200,7 @@ impl Reporter {
                 ),
             );
         }
+        lock(&status.echo).report(now, &mut transport);
         transport.value("not published: subscriber too slow", totals.would_block);
         transport.value("not published: other errors", totals.publish_errors);
         transport.value("results replaced by a newer one", totals.output_displaced);

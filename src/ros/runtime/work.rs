@@ -14,6 +14,7 @@ use crate::mailbox::{Mailbox, Taken};
 use crate::output::live::LiveOutput;
 use crate::perception::Perception;
 use crate::ros::diagnostics::{NodeStatus, Reporter, Surroundings};
+use crate::ros::echo::EchoCaller;
 use crate::ros::node::Graph;
 use crate::ros::params::ParameterStore;
 use crate::ros::time::NodeClock;
@@ -145,6 +146,7 @@ fn give_back(spares: &Spares, perception: Perception) {
 /// The output thread.
 pub(super) struct OutputThread {
     pub output: LiveOutput,
+    pub echo: Option<EchoCaller>,
     pub observer: Option<Observer>,
     pub store: Arc<ParameterStore>,
     pub status: Arc<NodeStatus>,
@@ -186,6 +188,9 @@ impl OutputThread {
                     &self.surroundings(),
                 );
                 self.output.publish_diagnostics(message);
+                if let Some(echo) = &self.echo {
+                    echo.call();
+                }
             }
         }
     }

@@ -57,6 +57,11 @@ impl<M: Message> ZenohPublisher<M> {
             .wait()
             .map_err(|e| WriteError::Middleware { reason: e.to_string(), data: message })
     }
+
+    /// The identity that travels with each of its messages.
+    pub fn gid(&self) -> Gid {
+        self.declared.gid.into()
+    }
 }
 
 /// A subscription.
