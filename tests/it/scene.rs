@@ -314,10 +314,19 @@ fn what_stands_is_found_and_what_floats_is_counted() {
 
 #[test]
 fn two_cells_are_a_thing_far_away_and_an_edge_nearby() {
-    let car = [-0.9, 0.9, 0.0, 1.1, 32.0];
-    let found = things(&upright(&[car])).list;
+    // A car 44 m away, before what is much farther than the wall.
+    let street = upright(&[]);
+    let (wall, far) = ((F * BASELINE / 40.0) as f32, 1.5);
+    let car = Image::from_fn(street.size(), |x, y| {
+        let (u, v) = standing::centre(x, y);
+        let height = HEIGHT - (f64::from(v) - HORIZON) * 44.0 / F;
+        let inside = (f64::from(u) - 320.0).abs() < 0.9 * F / 44.0 && (0.0..1.3).contains(&height);
+        let behind = if street.get(x, y) > wall { street.get(x, y) } else { far };
+        if inside { (F * BASELINE / 44.0) as f32 } else { behind }
+    });
+    let found = things(&car).list;
     assert_eq!(found.len(), 1, "{found:?}");
-    assert!((found[0].depth_m[0] - 32.0).abs() < 0.5, "{found:?}");
+    assert!((found[0].depth_m[0] - 44.0).abs() < 0.5, "{found:?}");
     // As many cells of a kerb.
     assert!(things(&upright(&[[-0.9, 0.9, 0.0, 0.4, 10.0]])).list.is_empty());
 }

@@ -31,7 +31,7 @@ const LEAST_CELLS: f32 = 3.0;
 /// Metres (of a road scene) from which so many cells are enough: what is far away is no higher than
 /// that, and what two surfaces mix to at an edge is lower.
 const FEW_CELLS: f32 = 2.0;
-const FEW_M: f32 = 0.6;
+const FEW_M: f32 = 0.8;
 
 /// Columns that are climbed side by side.
 pub const LANES: usize = 16;
