@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::image::Image;
+use crate::image::{Image, Size};
 use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
 use crate::stage::coarse::CELL;
 use crate::stage::saliency::AttentionScene;
@@ -116,21 +116,7 @@ impl EgoMotion {
             found = next;
             spread = self.residuals_of(&found).max(LEAST_SPREAD);
         }
-        self.blocks.resize(flow.blocks.size());
-        let residuals = self.residuals.as_flattened();
-        let cells = scene.cells.gray.size();
-        let width = self.blocks.width();
-        let blocks = self.blocks.pixels_mut().iter_mut().enumerate();
-        for ((i, out), (block, r)) in blocks.zip(flow.blocks.pixels().iter().zip(residuals)) {
-            let [u, v] = self.equations[i / LANES].expected(&found, i % LANES);
-            let x = middle(i % width, cells.width) as f64;
-            let y = middle(i / width, cells.height) as f64;
-            // What was out of view has no past that could have moved.
-            let was_seen = (0.0..cells.width as f64).contains(&(x + u))
-                && (0.0..cells.height as f64).contains(&(y + v));
-            let motion = block.firmness * (1.0 - (-0.5 * (r / (3.0 * spread)).powi(2)).exp());
-            *out = if was_seen { motion } else { 0.0 };
-        }
+        self.write_motion(flow, scene.cells.gray.size(), &found, spread);
         self.ranked.clear();
         self.ranked.extend(self.blocks.pixels().iter().map(|motion| motion.to_bits()));
         let rank = ((1.0 - MOVERS) * (self.ranked.len() - 1) as f32) as u32;
@@ -146,39 +132,60 @@ impl EgoMotion {
     /// u = f (−ρ tx + x ρ tz + x y wx − (1 + x²) wy + y wz),
     /// v = f (−ρ ty + y ρ tz + (1 + y²) wx − x y wy − x wz).
     fn write_equations(&mut self, flow: &Flow, scene: &AttentionScene<'_>, has_depth: bool) {
-        let (cx, cy) = scene.rig.principal_point();
-        let (cx, cy) = (cx as f32, cy as f32);
-        let (fx, fy) = (scene.rig.focal_px() as f32, scene.rig.focal_y_px() as f32);
         let filled = &scene.coarse.filled;
+        let cells = filled.size();
         let offset = scene.rig.disparity_offset() as f32;
         let per_pixel = PER_METRE / scene.rig.depth_scale() as f32;
-        let cell = CELL as f32;
-        self.equations.clear();
-        self.equations.resize(flow.blocks.size().area().div_ceil(LANES), Equations::default());
-        let places =
-            (0..flow.blocks.height()).flat_map(|y| (0..flow.blocks.width()).map(move |x| (x, y)));
-        for (i, ((x, y), block)) in places.zip(flow.blocks.pixels()).enumerate() {
-            let (u, v) = (middle(x, filled.width()), middle(y, filled.height()));
-            let (a, b) = ((u as f32 * cell - cx) / fx, (v as f32 * cell - cy) / fy);
-            let (f, g) = (fx / cell, fy / cell);
-            let rows = if has_depth {
-                let near = (filled.get(u, v) - offset).max(0.0) * per_pixel;
-                [
-                    [-near, 0.0, a * near, a * b, -(1.0 + a * a), b].map(|e| e * f),
-                    [0.0, -near, b * near, 1.0 + b * b, -a * b, -a].map(|e| e * g),
-                ]
-            } else {
-                [[1.0, a, b, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0, a, b]]
-            };
-            let (e, lane) = (&mut self.equations[i / LANES], i % LANES);
-            for (to, from) in e.rows.as_flattened_mut().iter_mut().zip(rows.as_flattened()) {
-                to[lane] = *from;
+        let (cx, cy) = scene.rig.principal_point();
+        let lens = Lens {
+            centre: [cx as f32, cy as f32],
+            focal: [scene.rig.focal_px() as f32, scene.rig.focal_y_px() as f32],
+        };
+        let mut places = Places::new(flow.blocks.width());
+        let groups = flow.blocks.pixels().chunks(LANES);
+        self.equations.resize(groups.len(), Equations::default());
+        dispatch!(self.level, simd => {
+            for (e, blocks) in self.equations.iter_mut().zip(groups) {
+                let [mut u, mut v, mut near] = [[0.0; LANES]; 3];
+                e.firmness = [0.0; LANES];
+                for (lane, block) in blocks.iter().enumerate() {
+                    let (x, y) = places.next(cells);
+                    (u[lane], v[lane]) = (x as f32, y as f32);
+                    near[lane] = (filled.get(x, y) - offset).max(0.0) * per_pixel;
+                    [e.shift[0][lane], e.shift[1][lane]] = block.shift;
+                    e.firmness[lane] = block.firmness;
+                }
+                let near = has_depth.then_some(&near);
+                lens.write(simd, [&u, &v], near, &mut e.rows);
             }
-            for (to, from) in e.shift.iter_mut().zip(block.shift) {
-                to[lane] = from;
+        });
+    }
+
+    /// Fills `blocks` with what each moved beside the camera's motion that was `found`.
+    fn write_motion(&mut self, flow: &Flow, cells: Size, found: &Unknowns, spread: f32) {
+        self.blocks.resize(flow.blocks.size());
+        let mut places = Places::new(flow.blocks.width());
+        let Self { level, equations, residuals, blocks: out, .. } = self;
+        let groups = out.pixels_mut().chunks_mut(LANES).zip(flow.blocks.pixels().chunks(LANES));
+        dispatch!(*level, _simd => {
+            for ((out, blocks), (e, residuals)) in groups.zip(equations.iter().zip(residuals)) {
+                let [u, v] = e.expected(found);
+                for (lane, (out, block)) in out.iter_mut().zip(blocks).enumerate() {
+                    let (x, y) = places.next(cells);
+                    let (u, v) = (x as f64 + u[lane], y as f64 + v[lane]);
+                    // What was out of view has no past that could have moved.
+                    let was_seen = u >= 0.0
+                        && u < cells.width as f64
+                        && v >= 0.0
+                        && v < cells.height as f64;
+                    *out = 0.0;
+                    if was_seen && block.firmness > 0.0 {
+                        let off = residuals[lane] / (3.0 * spread);
+                        *out = block.firmness * (1.0 - (-0.5 * off.powi(2)).exp());
+                    }
+                }
             }
-            e.firmness[lane] = block.firmness;
-        }
+        });
     }
 
     /// One step of least squares with weights from the residuals.
@@ -202,26 +209,21 @@ impl EgoMotion {
     fn residuals_of(&mut self, found: &Unknowns) -> f32 {
         let found = std::array::from_fn(|i| found[i] as f32);
         self.residuals.resize(self.equations.len(), [0.0; LANES]);
-        let Self { level, equations, residuals, .. } = self;
-        dispatch!(*level, simd => {
-            for (e, out) in equations.iter().zip(residuals.iter_mut()) {
-                e.residuals(simd, &found, out);
-            }
-        });
         self.ranked.resize(LANES * self.equations.len(), 0);
         let Self { level, equations, residuals, ranked, .. } = self;
         let ranked = ranked.as_chunks_mut::<LANES>().0;
         let middle = dispatch!(*level, simd => {
-            let mut firm = [0; LANES];
-            for ((e, residuals), out) in equations.iter().zip(residuals.iter()).zip(&mut *ranked) {
-                for i in 0..LANES {
-                    // The others come behind all.
-                    let is_firm = e.firmness[i] > FIRM;
-                    out[i] = if is_firm { residuals[i].to_bits() } else { u32::MAX };
-                    firm[i] += u32::from(is_firm);
-                }
+            let mut firm = 0;
+            for ((e, out), ranked) in equations.iter().zip(residuals).zip(&mut *ranked) {
+                let residuals = e.residuals(simd, &found);
+                residuals.store_slice(out);
+                let is_firm = f32x16::load_array_ref(simd, &e.firmness).simd_gt(FIRM);
+                // The others come behind all.
+                let last = u32x16::splat(simd, u32::MAX);
+                is_firm.select(residuals.bitcast(), last).store_slice(ranked);
+                firm += is_firm.to_bitmask().count_ones();
             }
-            ranked_at(simd, ranked, firm.iter().sum::<u32>() / 2)
+            ranked_at(simd, ranked, firm / 2)
         });
         RAYLEIGH * middle
     }
@@ -265,24 +267,98 @@ fn middle(block: usize, cells: usize) -> usize {
     (block * CELL + CELL / 2).min(cells - 1)
 }
 
+/// The blocks' places, row by row.
+struct Places {
+    x: usize,
+    y: usize,
+    width: usize,
+}
+
+impl Places {
+    const fn new(width: usize) -> Self {
+        Self { x: 0, y: 0, width }
+    }
+
+    /// The cell in the middle of the next block, of a map of `cells`.
+    #[inline(always)]
+    fn next(&mut self, cells: Size) -> (usize, usize) {
+        let place = (middle(self.x, cells.width), middle(self.y, cells.height));
+        self.x += 1;
+        if self.x == self.width {
+            (self.x, self.y) = (0, self.y + 1);
+        }
+        place
+    }
+}
+
+/// What makes rays of pixels, in pixels; horizontal before vertical.
+struct Lens {
+    centre: [f32; 2],
+    focal: [f32; 2],
+}
+
+impl Lens {
+    /// Writes the coefficients of blocks in the middle of these columns and rows of
+    /// cells; `near` are their inverse distances, where they are known.
+    #[inline(always)]
+    fn write<S: Simd>(
+        &self,
+        simd: S,
+        place: [&Lanes; 2],
+        near: Option<&Lanes>,
+        rows: &mut [[Lanes; UNKNOWNS]; 2],
+    ) {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let [mut a, mut b] = [zero; 2];
+        for (axis, ray) in [&mut a, &mut b].into_iter().enumerate() {
+            let at = f32x16::load_array_ref(simd, place[axis]) * CELL as f32;
+            *ray = (at - self.centre[axis]) / self.focal[axis];
+        }
+        let coefficients = if let Some(near) = near {
+            let near = f32x16::load_array_ref(simd, near);
+            [
+                [-near, zero, a * near, a * b, -(one + a * a), b],
+                [zero, -near, b * near, one + b * b, -a * b, -a],
+            ]
+        } else {
+            [[one, a, b, zero, zero, zero], [zero, zero, zero, one, a, b]]
+        };
+        for (axis, row) in rows.iter_mut().enumerate() {
+            let cells = if near.is_some() { self.focal[axis] / CELL as f32 } else { 1.0 };
+            for (to, from) in row.iter_mut().zip(coefficients[axis]) {
+                (from * cells).store_slice(to);
+            }
+        }
+    }
+}
+
 impl Equations {
-    /// The shift of a block under the motion that was found.
-    fn expected(&self, found: &Unknowns, lane: usize) -> [f64; 2] {
-        self.rows.map(|row| row.iter().zip(found.iter()).map(|(c, f)| f64::from(c[lane]) * f).sum())
+    /// The shifts of the blocks under the motion that was found.
+    #[inline(always)]
+    fn expected(&self, found: &Unknowns) -> [[f64; LANES]; 2] {
+        let mut shifts = [[0.0; LANES]; 2];
+        for (shifts, row) in shifts.iter_mut().zip(&self.rows) {
+            for (coefficients, found) in row.iter().zip(found.iter()) {
+                for (shift, coefficient) in shifts.iter_mut().zip(coefficients) {
+                    *shift += f64::from(*coefficient) * found;
+                }
+            }
+        }
+        shifts
     }
 
     /// Lengths of what is left of the shifts.
     #[inline(always)]
-    fn residuals<S: Simd>(&self, simd: S, found: &[f32; UNKNOWNS], out: &mut Lanes) {
+    fn residuals<S: Simd>(&self, simd: S, found: &[f32; UNKNOWNS]) -> f32x16<S> {
         let mut squares = f32x16::splat(simd, 0.0);
         for (row, shift) in self.rows.iter().zip(&self.shift) {
-            let mut left = f32x16::from_slice(simd, shift);
+            let mut left = f32x16::load_array_ref(simd, shift);
             for (coefficients, found) in row.iter().zip(found) {
-                left -= f32x16::from_slice(simd, coefficients) * *found;
+                left -= f32x16::load_array_ref(simd, coefficients) * *found;
             }
             squares += left * left;
         }
-        squares.sqrt().store_slice(out);
+        squares.sqrt()
     }
 }
 
