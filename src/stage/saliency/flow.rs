@@ -48,6 +48,8 @@ pub struct Flow {
     grid: Image<[i32; 2]>,
     next: Image<[i32; 2]>,
     rows: [Vec<[i32; 2]>; 3],
+    /// What was looked at last of the finest level.
+    around: Image<Around>,
     block: Image<f32>,
     /// One per 4x4 pixels: see [`Flow::sharpen`].
     pub blocks: Image<BlockShift>,
@@ -71,6 +73,7 @@ impl Flow {
             grid: Image::default(),
             next: Image::default(),
             rows: Default::default(),
+            around: Image::default(),
             block: Image::default(),
             blocks: Image::default(),
             dx: Image::default(),
@@ -88,8 +91,9 @@ impl Flow {
             let (now, windows) = (&self.now[level], &mut self.windows[level]);
             windows.take(&self.before[level]);
             self.next.resize(now.size().divided_by(STEP));
-            dispatch!(self.level, _simd => refine(now, windows, &self.grid, &mut self.next));
-            let Self { next, rows, grid, .. } = self;
+            self.around.resize(self.next.size());
+            let Self { next, rows, around, grid, .. } = self;
+            dispatch!(self.level, _simd => refine(now, windows, grid, around, next));
             dispatch!(self.level, _simd => median(next, rows, grid));
         }
         let (size, grid) = (now.size(), &self.grid);
@@ -100,12 +104,15 @@ impl Flow {
             }
             upsample(self.level, &self.block, size, out);
         }
-        let (now, before, trust) = (&self.now[0], &self.windows[0], &mut self.block);
+        let Self { now: [now, ..], windows: [before, ..], grid, around, block, .. } = self;
         dispatch!(self.level, _simd => {
             for y in 0..grid.height() {
-                for (x, value) in trust.row_mut(y).iter_mut().enumerate() {
-                    let cost = Block::new(now, x, y).and_then(|b| b.cost(before, grid.get(x, y)));
-                    let mean = cost.unwrap_or(0) as f32 / AREA;
+                let shifts = grid.row(y).iter().zip(around.row_mut(y));
+                for (x, (value, (shift, around))) in block.row_mut(y).iter_mut().zip(shifts).enumerate() {
+                    if around.shift != *shift {
+                        *around = Around::of(Block::new(now, x, y).as_ref(), before, *shift);
+                    }
+                    let mean = known(around.here).unwrap_or(0) as f32 / AREA;
                     *value = (1.0 - (mean - SURE) / FADE).clamp(0.0, 1.0);
                 }
             }
@@ -119,59 +126,99 @@ impl Flow {
     /// with arms of one slope: with values l and r one pixel to either side of
     /// the lowest, c, it is at (l − r) / (2 (max(l, r) − c)).
     pub fn sharpen(&mut self) {
-        self.blocks.resize(self.grid.size());
-        let Self { level, now: [now, ..], windows: [before, ..], grid, blocks, .. } = self;
+        self.blocks.resize(self.around.size());
+        let Self { level, around, blocks, .. } = self;
         dispatch!(*level, _simd => {
-            for y in 0..grid.height() {
-                for x in 0..grid.width() {
-                    blocks.set(x, y, sharpened(now, before, (x, y), grid.get(x, y)));
-                }
+            for (block, around) in blocks.pixels_mut().iter_mut().zip(around.pixels()) {
+                *block = around.sharpened();
             }
         });
     }
 }
 
-#[inline(always)]
-fn sharpened(
-    now: &Image<u8>,
-    before: &Windows,
-    (x, y): (usize, usize),
-    best: [i32; 2],
-) -> BlockShift {
-    let mut out = BlockShift { shift: best.map(|shift| shift as f32), firmness: 0.0 };
-    let Some(block) = Block::new(now, x, y) else { return out };
-    let Some(lowest) = block.cost(before, best) else { return out };
-    let mut rises = 0.0;
-    for axis in 0..2 {
-        let (mut back, mut on) = (best, best);
-        back[axis] -= 1;
-        on[axis] += 1;
-        let (less, more) = (block.cost(before, back), block.cost(before, on));
-        let most = less.unwrap_or(lowest).max(more.unwrap_or(lowest));
-        let rise = most.saturating_sub(lowest) as f32 / AREA;
-        rises += rise;
-        if let (Some(less), Some(more)) = (less, more)
-            && rise >= LEAST_RISE
-        {
-            let slope = (less as f32 - more as f32) / AREA;
-            out.shift[axis] += (slope / (2.0 * rise)).clamp(-0.5, 0.5);
-        }
+/// What is known of a block around one place: sums of absolute differences, there and
+/// one pixel before and behind it along both axes; [`NEVER`] where that is not inside
+/// the view.
+#[derive(Clone, Copy, Debug)]
+struct Around {
+    shift: [i32; 2],
+    here: u32,
+    beside: [[u32; 2]; 2],
+}
+
+/// More than any sum of differences.
+const NEVER: u32 = u32::MAX;
+
+fn known(cost: u32) -> Option<u32> {
+    (cost != NEVER).then_some(cost)
+}
+
+impl Default for Around {
+    fn default() -> Self {
+        Self { shift: [0; 2], here: NEVER, beside: [[NEVER; 2]; 2] }
     }
-    out.firmness = (rises / FIRM_RISE).min(1.0);
-    out
+}
+
+impl Around {
+    /// Of a block, where there is one.
+    #[inline(always)]
+    fn of(block: Option<&Block>, before: &Windows, shift: [i32; 2]) -> Self {
+        let mut out = Self { shift, ..Self::default() };
+        let Some(block) = block else { return out };
+        if let Some(place) = block.place(shift)
+            && let Some(([left, right], [above, here, below])) = before.around(place)
+        {
+            // Nothing of it is at the edge.
+            out.here = block.differences(here);
+            out.beside = [
+                [block.differences(left), block.differences(right)],
+                [block.differences(above), block.differences(below)],
+            ];
+            return out;
+        }
+        let [u, v] = shift;
+        out.here = block.cost(before, shift);
+        out.beside = [
+            [block.cost(before, [u - 1, v]), block.cost(before, [u + 1, v])],
+            [block.cost(before, [u, v - 1]), block.cost(before, [u, v + 1])],
+        ];
+        out
+    }
+
+    /// See [`Flow::sharpen`].
+    #[inline(always)]
+    fn sharpened(&self) -> BlockShift {
+        let mut out = BlockShift { shift: self.shift.map(|shift| shift as f32), firmness: 0.0 };
+        let Some(lowest) = known(self.here) else { return out };
+        let mut rises = 0.0;
+        for (shift, [less, more]) in out.shift.iter_mut().zip(self.beside) {
+            let (less, more) = (known(less), known(more));
+            let most = less.unwrap_or(lowest).max(more.unwrap_or(lowest));
+            let rise = most.saturating_sub(lowest) as f32 / AREA;
+            rises += rise;
+            if let (Some(less), Some(more)) = (less, more)
+                && rise >= LEAST_RISE
+            {
+                let slope = (less as f32 - more as f32) / AREA;
+                *shift += (slope / (2.0 * rise)).clamp(-0.5, 0.5);
+            }
+        }
+        out.firmness = (rises / FIRM_RISE).min(1.0);
+        out
+    }
 }
 
 /// Shifts of the blocks of one level from those of the coarser one, of which
-/// the coarsest level has none.
+/// the coarsest level has none, and at the others what is around those that were guessed.
 #[inline(always)]
 fn refine(
     now: &Image<u8>,
     before: &Windows,
     coarser: &Image<[i32; 2]>,
+    around: &mut Image<Around>,
     shifts: &mut Image<[i32; 2]>,
 ) {
     let coarsest = coarser.size().is_empty();
-    let reach = if coarsest { REACH } else { 1 };
     for y in 0..shifts.height() {
         for x in 0..shifts.width() {
             let guess = if coarsest {
@@ -181,34 +228,31 @@ fn refine(
                 let v = (y / 2).min(coarser.height() - 1);
                 coarser.get(u, v).map(|shift| 2 * shift)
             };
-            let Some(block) = Block::new(now, x, y) else {
-                shifts.set(x, y, guess);
-                continue;
-            };
-            let mut search = Search { before, block, guess, best: guess, cost: u32::MAX };
-            search.consider(guess);
-            let left = if x > 0 { shifts.get(x - 1, y) } else { guess };
-            let above = if y > 0 { shifts.get(x, y - 1) } else { guess };
-            // Often the same: nothing is weighed twice.
-            let still = [0, 0];
-            if still != guess {
-                search.consider(still);
-            }
-            if left != guess && left != still {
-                search.consider(left);
-            }
-            if above != guess && above != still && above != left {
-                search.consider(above);
-            }
-            for dy in -reach..=reach {
-                for dx in -reach..=reach {
-                    let shift = [guess[0] + dx, guess[1] + dy];
-                    // At the finer levels a step along one axis at a time.
-                    let step = shift != guess && (coarsest || dx * dy == 0);
-                    if step && shift != still && shift != left && shift != above {
-                        search.consider(shift);
-                    }
+            let block = Block::new(now, x, y);
+            let mut search = Search { before, guess, best: guess, cost: NEVER };
+            let others = [
+                [0, 0],
+                if x > 0 { shifts.get(x - 1, y) } else { guess },
+                if y > 0 { shifts.get(x, y - 1) } else { guess },
+            ];
+            if coarsest {
+                if let Some(block) = &block {
+                    search.look_around(block, others);
                 }
+            } else {
+                let near = Around::of(block.as_ref(), before, guess);
+                search.weigh(guess, near.here);
+                if let Some(block) = &block {
+                    search.consider(block, others);
+                }
+                let [[left, right], [up, down]] = near.beside;
+                let [u, v] = guess;
+                // A step along one axis at a time.
+                search.weigh([u, v - 1], up);
+                search.weigh([u - 1, v], left);
+                search.weigh([u + 1, v], right);
+                search.weigh([u, v + 1], down);
+                around.set(x, y, near);
             }
             shifts.set(x, y, search.best);
         }
@@ -219,20 +263,46 @@ fn refine(
 /// compiled without the wide instructions.)
 struct Search<'a> {
     before: &'a Windows,
-    block: Block,
     guess: [i32; 2],
     best: [i32; 2],
     cost: u32,
 }
 
 impl Search<'_> {
+    /// Takes a place if it is better: of equal ones the first stays.
     #[inline(always)]
-    fn consider(&mut self, shift: [i32; 2]) {
-        if let Some(cost) = self.block.cost(self.before, shift) {
-            let off = shift[0].abs_diff(self.guess[0]) + shift[1].abs_diff(self.guess[1]);
-            let cost = cost + STIFFNESS * off;
-            if cost < self.cost {
-                (self.best, self.cost) = (shift, cost);
+    fn weigh(&mut self, shift: [i32; 2], cost: u32) {
+        let off = shift[0].abs_diff(self.guess[0]) + shift[1].abs_diff(self.guess[1]);
+        let cost = cost.saturating_add(STIFFNESS * off);
+        if cost < self.cost {
+            (self.best, self.cost) = (shift, cost);
+        }
+    }
+
+    /// The shifts of nothing and of blocks beside, which are often the same: nothing is
+    /// weighed twice.
+    #[inline(always)]
+    fn consider(&mut self, block: &Block, [still, left, above]: [[i32; 2]; 3]) {
+        if still != self.guess {
+            self.weigh(still, block.cost(self.before, still));
+        }
+        if left != self.guess && left != still {
+            self.weigh(left, block.cost(self.before, left));
+        }
+        if above != self.guess && above != still && above != left {
+            self.weigh(above, block.cost(self.before, above));
+        }
+    }
+
+    /// The same, and all places within reach of the guess.
+    #[inline(always)]
+    fn look_around(&mut self, block: &Block, others: [[i32; 2]; 3]) {
+        self.weigh(self.guess, block.cost(self.before, self.guess));
+        self.consider(block, others);
+        for dy in -REACH..=REACH {
+            for dx in -REACH..=REACH {
+                let shift = [self.guess[0] + dx, self.guess[1] + dy];
+                self.weigh(shift, block.cost(self.before, shift));
             }
         }
     }
@@ -249,9 +319,12 @@ fn pyramid(level: Level, view: &Image<u8>, out: &mut [Image<u8>; LEVELS]) {
     }
 }
 
+/// The rows of a block, one after the other.
+type Pixels = [u8; BLOCK * BLOCK];
+
 /// A block of a view.
 struct Block {
-    pixels: [u8; BLOCK * BLOCK],
+    pixels: Pixels,
     /// Its left upper corner, and those of the last ones inside the view.
     start: [usize; 2],
     last: [usize; 2],
@@ -272,21 +345,32 @@ impl Block {
         Some(Self { pixels, start, last })
     }
 
-    /// Sum of absolute differences between the block and its shifted place;
-    /// `None` where that is not inside the view.
+    /// The left upper corner of its shifted place, where that is inside the view.
     #[inline(always)]
-    fn cost(&self, before: &Windows, shift: [i32; 2]) -> Option<u32> {
+    fn place(&self, shift: [i32; 2]) -> Option<[usize; 2]> {
         let x = usize::try_from(self.start[0] as i32 + shift[0]).ok()?;
         let y = usize::try_from(self.start[1] as i32 + shift[1]).ok()?;
-        if x > self.last[0] || y > self.last[1] {
-            return None;
+        (x <= self.last[0] && y <= self.last[1]).then_some([x, y])
+    }
+
+    /// Sum of absolute differences between the block and its shifted place;
+    /// [`NEVER`] where that is not inside the view.
+    #[inline(always)]
+    fn cost(&self, before: &Windows, shift: [i32; 2]) -> u32 {
+        match self.place(shift).and_then(|place| before.block(place)) {
+            Some(place) => self.differences(place),
+            None => NEVER,
         }
-        let place = before.block(x, y)?;
+    }
+
+    /// Sum of absolute differences between the block and another one.
+    #[inline(always)]
+    fn differences(&self, place: &Pixels) -> u32 {
         let mut sum = 0;
         for (here, there) in self.pixels.iter().zip(place) {
             sum += u32::from(here.abs_diff(*there));
         }
-        Some(sum)
+        sum
     }
 }
 
@@ -315,9 +399,26 @@ impl Windows {
 
     /// The block with its left upper corner at `(x, y)`, in rows.
     #[inline(always)]
-    fn block(&self, x: usize, y: usize) -> Option<&[u8; BLOCK * BLOCK]> {
+    fn block(&self, [x, y]: [usize; 2]) -> Option<&Pixels> {
         let rows: &[[u8; BLOCK]; BLOCK] = self.rows.get(x * self.height + y..)?.first_chunk()?;
         rows.as_flattened().first_chunk()
+    }
+
+    /// The blocks to the left and to the right of that and those above, here and below;
+    /// `None` where one is not inside the view.
+    #[inline(always)]
+    fn around(&self, [x, y]: [usize; 2]) -> Option<([&Pixels; 2], [&Pixels; 3])> {
+        let (left, above) = (x.checked_sub(1)?, y.checked_sub(1)?);
+        if above + BLOCK + 2 > self.height {
+            return None;
+        }
+        let sides = [self.block([left, y])?, self.block([x + 1, y])?];
+        let rows: &[[u8; BLOCK]; BLOCK + 2] =
+            self.rows.get(x * self.height + above..)?.first_chunk()?;
+        let rows = rows.as_flattened();
+        let upright =
+            [rows.first_chunk()?, rows[BLOCK..].first_chunk()?, rows[2 * BLOCK..].first_chunk()?];
+        Some((sides, upright))
     }
 }
 
