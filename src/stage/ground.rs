@@ -1,5 +1,6 @@
 //! The plane that things stand on.
 
+pub(super) mod height;
 pub(super) mod plane;
 pub(super) mod running;
 

@@ -1,7 +1,7 @@
 //! How far a thing stands out in depth from what is beside it.
 
 use crate::image::Image;
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, store_inside};
 use crate::stage::coarse::CELL;
 
 /// Distances looked at on both sides, in cells.
@@ -13,19 +13,23 @@ const FULL_DROP: f32 = 0.35;
 /// A drop up to this many pixels is noise.
 pub const NOISE_PX: f32 = 0.15;
 
-/// Lateral depth contrast, with its buffers.
+/// Cells that are looked at at once.
+const LANES: usize = 16;
+/// Cells beyond the ends of a row, for every offset and a cut group.
+const BESIDE: usize = OFFSETS[OFFSETS.len() - 1] + LANES;
+
+/// Lateral depth contrast, with its buffer.
 #[derive(Debug)]
 pub struct Lateral {
     level: Level,
-    left: Vec<f32>,
-    right: Vec<f32>,
-    reach: Vec<f32>,
+    /// One row, with cells beyond its ends from which nothing drops.
+    row: Vec<f32>,
 }
 
 impl Lateral {
     /// The cue at this SIMD level.
     pub fn new(level: Level) -> Self {
-        Self { level, left: Vec::new(), right: Vec::new(), reach: Vec::new() }
+        Self { level, row: Vec::new() }
     }
 
     /// C = min(1, (min(l, r) + max(l, r) / 2) / (0.35 d)) where l and r are the
@@ -38,48 +42,44 @@ impl Lateral {
     pub fn run(&mut self, disparity: &Image<f32>, px_per_m: f32, scale: f32, out: &mut Image<f32>) {
         let width = disparity.width();
         out.resize(disparity.size());
-        for buffer in [&mut self.left, &mut self.right, &mut self.reach] {
-            buffer.clear();
-            buffer.resize(width, 0.0);
-        }
+        self.row.clear();
+        self.row.resize(width + 2 * BESIDE, f32::INFINITY);
         let cells_per_disparity = REACH_M * scale * px_per_m / CELL as f32;
-        let Self { level, left, right, reach } = self;
-        dispatch!(*level, _simd => {
+        let Self { level, row } = self;
+        dispatch!(*level, simd => {
             for y in 0..disparity.height() {
-                let d = disparity.row(y);
-                left.fill(NOISE_PX);
-                right.fill(NOISE_PX);
-                for (reach, &d) in reach.iter_mut().zip(d) {
-                    // At least the smallest offset, wherever the thing is.
-                    *reach = (d * cells_per_disparity).max(OFFSETS[0] as f32);
-                }
-                for offset in OFFSETS.into_iter().filter(|&o| o < width) {
-                    let (at, n) = (offset as f32, width - offset);
-                    drops(at, &d[offset..], &d[..n], &reach[offset..], &mut left[offset..]);
-                    drops(at, &d[..n], &d[offset..], &reach[..n], &mut right[..n]);
-                }
-                for (((out, &d), &l), &r) in
-                    out.row_mut(y).iter_mut().zip(d).zip(left.iter()).zip(right.iter())
-                {
-                    let drop = l.min(r) + 0.5 * l.max(r) - 1.5 * NOISE_PX;
-                    *out = contrast(drop, d);
+                row[BESIDE..BESIDE + width].copy_from_slice(disparity.row(y));
+                for x in (0..width).step_by(LANES) {
+                    let around = &row[x..x + 2 * BESIDE];
+                    let contrast = contrast_of(simd, around, cells_per_disparity);
+                    store_inside(out.row_mut(y), x, contrast);
                 }
             }
         });
     }
 }
 
-/// A drop of disparity from `disparity`, in pixels, as a contrast of at most 1.
+/// The contrast of the cells in the middle of `around`.
 #[inline(always)]
-pub fn contrast(drop: f32, disparity: f32) -> f32 {
-    (drop / (FULL_DROP * disparity.max(0.5))).min(1.0)
+fn contrast_of<S: Simd>(simd: S, around: &[f32], cells_per_disparity: f32) -> f32x16<S> {
+    let cells = |at: usize| f32x16::from_slice(simd, &around[at..at + LANES]);
+    let d = cells(BESIDE);
+    // At least the smallest offset, wherever the thing is.
+    let reach = (d * cells_per_disparity).max(OFFSETS[0] as f32);
+    let [mut left, mut right] = [f32x16::splat(simd, NOISE_PX); 2];
+    for offset in OFFSETS {
+        let within = reach.simd_ge(offset as f32);
+        if !within.any_true() {
+            break;
+        }
+        left = within.select(left.max(d - cells(BESIDE - offset)), left);
+        right = within.select(right.max(d - cells(BESIDE + offset)), right);
+    }
+    contrast(left.min(right) + left.max(right) * 0.5 - 1.5 * NOISE_PX, d)
 }
 
-/// The larger of `most` and the drop from here to there, where `at` is within reach.
+/// Drops of disparity from `disparity`, in pixels, as contrasts of at most 1.
 #[inline(always)]
-fn drops(at: f32, here: &[f32], there: &[f32], reach: &[f32], most: &mut [f32]) {
-    for (((most, &here), &there), &reach) in most.iter_mut().zip(here).zip(there).zip(reach) {
-        let drop = if at <= reach { here - there } else { 0.0 };
-        *most = most.max(drop);
-    }
+pub fn contrast<S: Simd>(drop: f32x16<S>, disparity: f32x16<S>) -> f32x16<S> {
+    (drop / (disparity.max(0.5) * FULL_DROP)).min(1.0)
 }

@@ -5,16 +5,11 @@ use super::{HIGH, WIDE, centre, size_scale};
 use crate::image::Image;
 use crate::simd::{Simd, f32x16, mask32x16, padded, prelude::*};
 use crate::stage::ground::Plane;
+use crate::stage::ground::height::{HIGH_M, LEAST_DISPARITY, NOISE_PX};
 use crate::stage::regions::components::{TOLERANCE_PART, TOLERANCE_PX};
 
 /// Height in metres (of a road scene) from which a cell is above the ground.
 pub const LOW_M: f32 = 0.2;
-/// Uncertainty of a cell's disparity in pixels; it lifts the lower limit far away.
-const NOISE_PX: f32 = 0.4;
-/// Height up to which surfaces are joined: the crowns of trees begin there, metres.
-const HIGH_M: f32 = 2.6;
-/// Disparity in pixels below which heights are noise.
-const LEAST_DISPARITY: f32 = 1.2;
 /// A segment that begins no higher than this stands on the ground, metres.
 const CONTACT_M: f32 = 0.6;
 /// A surface that reaches higher than a lorry is part of a building, a tree or a pole.

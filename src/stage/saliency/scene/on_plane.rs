@@ -2,10 +2,11 @@
 
 use crate::image::Image;
 use crate::simd::{Level, dispatch};
+use crate::stage::ground::height::LEAST_DISPARITY;
 use crate::stage::ground::{Plane, cell_centre};
 use crate::stage::saliency::AttentionScene;
 use crate::stage::saliency::beside::Beside;
-use crate::stage::saliency::columns::{Columns, FADE_IN_M, LEAST_DISPARITY, LOW_M};
+use crate::stage::saliency::columns::{Columns, FADE_IN_M, LOW_M};
 use crate::stage::saliency::lateral::Lateral;
 use crate::stage::saliency::structure::Structure;
 
