@@ -1,15 +1,16 @@
 //! Polygons with fewer points.
 
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f64x8, mask64x8, prelude::*};
 
 /// Points whose distances are reckoned side by side.
-const LANES: usize = 16;
+const LANES: usize = 8;
 
 /// The simplification with its buffers. A stack of its own takes the place of
 /// recursion: boundaries may have as many points as the image has pixels.
 #[derive(Debug)]
 pub struct Simplify {
     level: Level,
+    points: Points,
     keep: Vec<bool>,
     stack: Vec<(usize, usize)>,
 }
@@ -17,7 +18,7 @@ pub struct Simplify {
 impl Simplify {
     /// The simplification with instructions of `level`.
     pub fn new(level: Level) -> Self {
-        Self { level, keep: Vec::new(), stack: Vec::new() }
+        Self { level, points: Points::default(), keep: Vec::new(), stack: Vec::new() }
     }
 
     /// Which points of a closed polygon to keep so that no other one is farther
@@ -27,24 +28,26 @@ impl Simplify {
         let n = points.len();
         self.keep.clear();
         self.keep.resize(n, false);
-        let Some(&start) = points.first() else { return &self.keep };
-        // A closed curve is cut at its first point and at the one farthest from it.
-        let (_, opposite) = Line::new(start, start).farthest(self.level, points);
-        self.keep[0] = true;
-        self.keep[opposite] = true;
-        let limit = f64::from(tolerance_px).powi(2);
-        self.stack.clear();
-        self.stack.extend([(0, opposite), (opposite, n)]);
-        while let Some((from, to)) = self.stack.pop() {
-            let line = Line::new(points[from], points[to % n]);
-            let between = points.get(from + 1..to).unwrap_or_default();
-            let (distance, at) = line.farthest(self.level, between);
-            if distance > limit * line.scale {
-                let i = from + 1 + at;
-                self.keep[i] = true;
-                self.stack.extend([(from, i), (i, to)]);
-            }
+        if n == 0 {
+            return &self.keep;
         }
+        self.points.take(points);
+        let Self { level, points, keep, stack } = self;
+        dispatch!(*level, simd => {
+            // A closed curve is cut at its first point and at the one farthest from it.
+            let opposite = points.farthest(simd, 0, n, 0, 0.0).unwrap_or(0);
+            keep[0] = true;
+            keep[opposite] = true;
+            let limit = f64::from(tolerance_px).powi(2);
+            stack.clear();
+            stack.extend([(0, opposite), (opposite, n)]);
+            while let Some((from, to)) = stack.pop() {
+                if let Some(i) = points.farthest(simd, from, to, to % n, limit) {
+                    keep[i] = true;
+                    stack.extend([(from, i), (i, to)]);
+                }
+            }
+        });
         // Two points enclose nothing: a mask as thin as a line keeps a third.
         if n > 2
             && self.keep.iter().filter(|keep| **keep).count() == 2
@@ -56,74 +59,64 @@ impl Simplify {
     }
 }
 
-/// A segment between two points. Whole numbers, in a form that vectors multiply:
-/// exact for images with a diagonal of up to 9700 pixels.
-struct Line {
-    from: [f64; 2],
-    along: [f64; 2],
-    /// Its squared length, or 1 where it has none.
-    scale: f64,
+/// Columns and rows of points, and room for a whole group behind the last one. Whole
+/// numbers, in a form that vectors multiply: exact for images with a diagonal of up to
+/// 9700 pixels.
+#[derive(Debug, Default)]
+struct Points {
+    x: Vec<f64>,
+    y: Vec<f64>,
 }
 
-impl Line {
-    fn new(from: [i32; 2], to: [i32; 2]) -> Self {
-        let (from, to) = (from.map(f64::from), to.map(f64::from));
-        let [x, y] = [to[0] - from[0], to[1] - from[1]];
-        Self { from, along: [x, y], scale: (x * x + y * y).max(1.0) }
+impl Points {
+    fn take(&mut self, points: &[[i32; 2]]) {
+        for (axis, out) in [&mut self.x, &mut self.y].into_iter().enumerate() {
+            out.clear();
+            out.extend(points.iter().map(|point| f64::from(point[axis])));
+            out.resize(points.len() + LANES, 0.0);
+        }
     }
 
-    /// The largest squared distance of `points` from the segment, square pixels,
-    /// times the scale, and the first of them that has it; (0, 0) without any.
-    fn farthest(&self, level: Level, points: &[[i32; 2]]) -> (f64, usize) {
-        dispatch!(level, _simd => self.farthest_of(points))
-    }
-
+    /// The first of those between `from` and `to` that are farthest from the segment from
+    /// point `from` to point `end`, if that is farther than the root of `limit`, in square
+    /// pixels.
     #[inline(always)]
-    fn farthest_of(&self, points: &[[i32; 2]]) -> (f64, usize) {
-        let mut worst = (0.0, 0);
-        let (groups, rest) = points.as_chunks::<LANES>();
-        for (group, points) in groups.iter().enumerate() {
-            let mut distances = [0.0; LANES];
-            for i in 0..LANES {
-                distances[i] = self.scaled_distance(points[i]);
+    fn farthest<S: Simd>(
+        &self,
+        simd: S,
+        from: usize,
+        to: usize,
+        end: usize,
+        limit: f64,
+    ) -> Option<usize> {
+        let (x0, y0) = (self.x[from], self.y[from]);
+        let (bx, by) = (self.x[end] - x0, self.y[end] - y0);
+        // The segment's squared length, or 1 where it has none; distances are multiplied by
+        // it, so that nothing is divided.
+        let scale = (bx * bx + by * by).max(1.0);
+        let zero = f64x8::splat(simd, 0.0);
+        let (mut most, mut farthest) = (limit * scale, None);
+        for at in (from + 1..to).step_by(LANES) {
+            let x = f64x8::from_slice(simd, &self.x[at..at + LANES]) - x0;
+            let y = f64x8::from_slice(simd, &self.y[at..at + LANES]) - y0;
+            let along = x * bx + y * by;
+            let before = (x * x + y * y) * scale;
+            let behind = ((x - bx) * (x - bx) + (y - by) * (y - by)) * scale;
+            let line = x * by - y * bx;
+            let ends = along.simd_le(0.0).select(before, behind);
+            let beside = along.simd_gt(0.0) & along.simd_lt(scale);
+            let mut distance = beside.select(line * line, ends);
+            if at + LANES > to {
+                let inside = mask64x8::from_bitmask(simd, (1 << (to - at)) - 1);
+                distance = inside.select(distance, zero);
             }
-            let mut farther = false;
-            for distance in distances {
-                farther |= distance > worst.0;
-            }
-            if farther {
-                take_farthest(&distances, group * LANES, &mut worst);
+            if distance.simd_gt(most).any_true() {
+                most = distance.reduce_max();
+                let first = distance.simd_eq(most).to_bitmask().trailing_zeros();
+                farthest = Some(at + first as usize);
             }
         }
-        for (i, point) in (groups.len() * LANES..).zip(rest) {
-            take_farthest(&[self.scaled_distance(*point)], i, &mut worst);
-        }
-        worst
-    }
-
-    /// Squared distance of a point from the segment, square pixels, times the
-    /// scale, so that nothing is divided.
-    #[inline(always)]
-    fn scaled_distance(&self, point: [i32; 2]) -> f64 {
-        let [x, y] = [f64::from(point[0]) - self.from[0], f64::from(point[1]) - self.from[1]];
-        let [bx, by] = self.along;
-        let along = x * bx + y * by;
-        let before = (x * x + y * y) * self.scale;
-        let behind = ((x - bx) * (x - bx) + (y - by) * (y - by)) * self.scale;
-        let beside = (x * by - y * bx) * (x * by - y * bx);
-        let end = if along <= 0.0 { before } else { behind };
-        if along > 0.0 && along < self.scale { beside } else { end }
-    }
-}
-
-/// Puts the first of the largest `distances`, whose points begin at `first`, in
-/// the place of a smaller one.
-#[inline(always)]
-fn take_farthest(distances: &[f64], first: usize, worst: &mut (f64, usize)) {
-    for (i, &distance) in (first..).zip(distances) {
-        if distance > worst.0 {
-            *worst = (distance, i);
-        }
+        farthest
     }
 }
 
