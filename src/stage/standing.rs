@@ -7,6 +7,8 @@ mod sides;
 mod split;
 mod thing;
 
+use std::ops::Range;
+
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
 use crate::simd::{Level, dispatch};
@@ -57,6 +59,7 @@ pub struct Standing {
     rows: Vec<u32>,
     seen: Vec<u32>,
     limits: Vec<[u32; 2]>,
+    strip: Strip,
 }
 
 impl Standing {
@@ -72,6 +75,7 @@ impl Standing {
             rows: Vec::new(),
             seen: Vec::new(),
             limits: Vec::new(),
+            strip: Strip::default(),
         }
     }
 
@@ -203,7 +207,6 @@ impl Standing {
     fn paint(&mut self, disparity: &Image<f32>, out: &mut Things) {
         let size = disparity.size();
         out.ids.resize(size);
-        out.ids.fill(0);
         out.surface.resize(size);
         self.rows.clear();
         // One place more for the lower end of what reaches the lowest row.
@@ -236,39 +239,100 @@ impl Standing {
             let (top, bottom) = (end(&mut rows.iter()), end(&mut rows.iter().rev()));
             self.limits.push([top, size.height as u32 - bottom]);
         }
+        self.write(disparity, out);
+    }
+
+    /// The same within the limits.
+    fn write(&mut self, disparity: &Image<f32>, out: &mut Things) {
+        let Size { width: columns, height } = disparity.size();
         self.seen.clear();
         self.seen.resize(out.list.len(), 0);
-        for (s, &thing) in self.columns.segments.iter().zip(&self.thing).filter(|(_, t)| **t != 0) {
-            let index = thing as usize - 1;
-            // Segments come column by column: what has passed is the share to the left.
-            let total = out.list[index].cells as f32;
-            let passed = self.seen[index];
-            self.seen[index] += s.cells;
-            if ((passed + s.cells) as f32) < TRIM * total || passed as f32 > (1.0 - TRIM) * total {
-                continue;
-            }
-            let [top, bottom] = self.limits[index];
-            let (upper, lower) = (s.upper.max(top) as usize, s.lower.min(bottom) as usize);
-            let (at, n) = (upper * size.width + s.x as usize, lower.saturating_sub(upper));
-            let d = s.disparity();
-            for id in out.ids.pixels_mut().iter_mut().skip(at).step_by(size.width).take(n) {
-                *id = thing;
-            }
-            for at in out.surface.pixels_mut().iter_mut().skip(at).step_by(size.width).take(n) {
-                *at = d;
-            }
-            // A pole is seen up to its end, a trunk up to its crown, a plate wholly.
-            let Thing { narrow, plate, .. } = out.list[index];
-            if plate || narrow && s.top == Top::Tall {
-                for y in (s.reach..s.upper.min(bottom)).rev() {
-                    if !plate && width(disparity, s, y) > MOST_WIDE {
-                        break;
-                    }
-                    out.ids.set(s.x as usize, y as usize, thing);
-                    out.surface.set(s.x as usize, y as usize, d);
+        self.strip.clear(height);
+        let Self { columns: Columns { segments, .. }, thing, seen, limits, strip, .. } = self;
+        let mut segments = segments.iter().zip(&*thing).filter(|(_, t)| **t != 0).peekable();
+        for first in (0..columns).step_by(Strip::WIDTH) {
+            let inside = |s: &Segment| (s.x as usize) < first + Strip::WIDTH;
+            while let Some((s, &thing)) = segments.next_if(|(s, _)| inside(s)) {
+                let index = thing as usize - 1;
+                // Segments come column by column: what has passed is the share to the left.
+                let total = out.list[index].cells as f32;
+                let passed = seen[index];
+                seen[index] += s.cells;
+                if ((passed + s.cells) as f32) < TRIM * total
+                    || passed as f32 > (1.0 - TRIM) * total
+                {
+                    continue;
+                }
+                let [top, bottom] = limits[index];
+                let (x, d) = (s.x as usize - first, s.disparity());
+                strip.paint(x, s.upper.max(top)..s.lower.min(bottom), thing, d);
+                // A pole is seen up to its end, a trunk up to its crown, a plate wholly.
+                let Thing { narrow, plate, .. } = out.list[index];
+                if plate || narrow && s.top == Top::Tall {
+                    let end = s.upper.min(bottom);
+                    let same = |y: &u32| plate || width(disparity, s, *y) <= MOST_WIDE;
+                    let n = (s.reach..end).rev().take_while(same).count() as u32;
+                    strip.paint(x, end - n..end, thing, d);
                 }
             }
+            strip.give(first, out);
         }
+    }
+}
+
+/// Some columns of cells by themselves: those of an image are far apart.
+#[derive(Debug, Default)]
+struct Strip {
+    ids: Vec<[u32; Self::WIDTH]>,
+    surface: Vec<[f32; Self::WIDTH]>,
+    /// The rows that were written.
+    rows: Range<usize>,
+}
+
+impl Strip {
+    const WIDTH: usize = 16;
+
+    /// No cell of any of `height` rows belongs to a thing.
+    fn clear(&mut self, height: usize) {
+        self.ids.clear();
+        self.ids.resize(height, [0; Self::WIDTH]);
+        self.surface.resize(height, [0.0; Self::WIDTH]);
+        self.rows = height..0;
+    }
+
+    /// Gives some rows of a column to a thing.
+    fn paint(&mut self, x: usize, rows: Range<u32>, id: u32, surface: f32) {
+        if rows.is_empty() {
+            return;
+        }
+        let rows = rows.start as usize..rows.end as usize;
+        for (ids, surfaces) in
+            self.ids[rows.clone()].iter_mut().zip(&mut self.surface[rows.clone()])
+        {
+            ids[x % Self::WIDTH] = id;
+            surfaces[x % Self::WIDTH] = surface;
+        }
+        self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
+    }
+
+    /// Writes the columns from `first` on, and forgets them.
+    fn give(&mut self, first: usize, out: &mut Things) {
+        for (y, ids) in self.ids.iter().enumerate() {
+            put(ids, &mut out.ids.row_mut(y)[first..]);
+        }
+        for y in self.rows.clone() {
+            put(&self.surface[y], &mut out.surface.row_mut(y)[first..]);
+            self.ids[y] = [0; Self::WIDTH];
+        }
+        self.rows = self.ids.len()..0;
+    }
+}
+
+/// Writes as many of the cells as there is room for.
+fn put<T: Copy>(cells: &[T; Strip::WIDTH], row: &mut [T]) {
+    match row.first_chunk_mut() {
+        Some(row) => *row = *cells,
+        None => row.copy_from_slice(&cells[..row.len()]),
     }
 }
 

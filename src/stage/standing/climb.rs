@@ -112,7 +112,12 @@ pub fn climb<S: Simd>(
                 low: height.simd_le(contact),
                 at,
             };
-            state.step(&cells, out);
+            // Road or crowns alone: nothing begins, goes on or ends.
+            let rises = known & !cells.ground & !cells.high;
+            if (state.inside | rises).any_true() {
+                state.step(&cells, out);
+            }
+            state.pass(&cells);
         }
     }
     // At the edge of the image nobody knows how far up it goes.
@@ -138,7 +143,7 @@ struct Row<S: Simd> {
 }
 
 impl<S: Simd> Climb<S> {
-    /// One row further up.
+    /// One row further up, before [`Climb::pass`].
     #[inline(always)]
     fn step(&mut self, cells: &Row<S>, out: &mut Vec<Segment>) {
         let &Row { y, d, known, ground, high, height, low, at } = cells;
@@ -171,7 +176,6 @@ impl<S: Simd> Climb<S> {
         self.cells = starts
             .select(f32x16::splat(self.simd, 1.0), grows.select(self.cells + 1.0, self.cells));
         self.mean = takes.select(self.sum / self.cells, self.mean);
-        self.last = known.select(d, self.last);
         self.upper = takes.select(f32x16::splat(self.simd, y), self.upper);
         self.lower = starts.select(f32x16::splat(self.simd, y + 1.0), self.lower);
         self.bottom_m = starts.select(height, self.bottom_m);
@@ -179,6 +183,13 @@ impl<S: Simd> Climb<S> {
         self.contact = (starts & (carried | low)) | (self.contact & !starts);
         self.tall = (self.tall & !starts) | (on & height.simd_gt(TALL_M));
         self.inside = starts | (self.inside & !ended);
+    }
+
+    /// What a row leaves behind whatever begins or ends in it.
+    #[inline(always)]
+    fn pass(&mut self, cells: &Row<S>) {
+        let &Row { y, d, known, ground, .. } = cells;
+        self.last = known.select(d, self.last);
         self.row = known.select(f32x16::splat(self.simd, y), self.row);
         self.on_ground = (known & ground) | (self.on_ground & !known);
     }
