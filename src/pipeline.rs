@@ -169,7 +169,7 @@ impl Pipeline {
         let source = RegionSource {
             left: &out.left,
             attention: &out.attention,
-            roi: &out.roi,
+            roi: self.roi.masks(),
             disparity: &out.disparity,
             coarse: &self.coarse_disparity,
             confidence: &out.confidence,

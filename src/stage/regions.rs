@@ -20,11 +20,12 @@ use rayon::prelude::*;
 use crate::camera::StereoRig;
 use crate::config::{Config, SaliencyMode};
 use crate::image::{Image, Size};
-use crate::perception::{Region, RegionList, Rejections, RoiMask, View};
+use crate::perception::{Region, RegionList, Rejections, View};
 use crate::simd::{Level, Simd, dispatch, mask16x16, prelude::*, u8x16, u16x16};
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::depth::Depth;
 use crate::stage::ground::Plane;
+use crate::stage::roi::Masks;
 use candidates::Candidates;
 use components::Components;
 use contour::Contour;
@@ -67,7 +68,7 @@ pub struct RegionSource<'a> {
     /// makes of it.
     pub attention: &'a Image<f32>,
     /// Region of interest.
-    pub roi: &'a RoiMask,
+    pub roi: &'a Masks,
     /// Disparity in pixels, NaN where there is none.
     pub disparity: &'a Image<f32>,
     /// Disparity of the whole frame, coarser.
@@ -94,6 +95,8 @@ pub struct Regions {
     contour_tolerance: f32,
     depth: Depth,
     components: Components,
+    /// The salient pixels, where their components are asked for.
+    salient: Image<u8>,
     upright: Upright,
     raised: Raised,
     candidates: Candidates,
@@ -124,6 +127,7 @@ impl Regions {
             contour_tolerance: config.regions.contour_tolerance as f32,
             depth: Depth::new(config),
             components: Components::default(),
+            salient: Image::default(),
             upright: Upright::new(level),
             raised: Raised::new(level),
             candidates: Candidates::default(),
@@ -150,7 +154,8 @@ impl Regions {
         } else if let Some(plane) = source.table {
             joined = self.raised.run(plane, source, &mut self.components, &mut self.candidates);
         } else {
-            self.components.run(&source.roi.salient, source.disparity, &mut self.candidates);
+            source.roi.salient.write(self.level, &mut self.salient);
+            self.components.run(&self.salient, source.disparity, &mut self.candidates);
         }
         self.ids.clear();
         for (id, bounds) in (1..).zip(&self.candidates.boxes) {

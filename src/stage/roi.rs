@@ -26,6 +26,15 @@ const CLOSING: usize = 2;
 /// by the fine one; here nothing may be lost that it would accept.
 const SLACK: f32 = 1.0;
 
+/// The region of interest, one bit for each pixel.
+#[derive(Debug, Default)]
+pub struct Masks {
+    /// See [`RoiMask::salient`].
+    pub salient: BitMask,
+    /// See [`RoiMask::matched`].
+    pub matched: BitMask,
+}
+
 /// Threshold, morphology, components, area budget, dilation.
 pub struct Roi {
     level: Level,
@@ -38,8 +47,7 @@ pub struct Roi {
     dilation: usize,
     max_fraction: f64,
     allowance: f64,
-    salient: BitMask,
-    matched: BitMask,
+    masks: Masks,
     /// Pixels of `matched`.
     area: usize,
     components: Components,
@@ -63,8 +71,7 @@ impl Roi {
             dilation: usize::try_from(config.roi.dilation).unwrap_or(0),
             max_fraction: config.roi.max_fraction,
             allowance: 1.0,
-            salient: BitMask::default(),
-            matched: BitMask::default(),
+            masks: Masks::default(),
             area: 0,
             components: Components::default(),
             budget: Budget::default(),
@@ -80,6 +87,11 @@ impl Roi {
     /// `roi.max_fraction` allows more.
     pub fn set_allowance(&mut self, fraction: f64) {
         self.allowance = fraction;
+    }
+
+    /// The masks of the last run.
+    pub const fn masks(&self) -> &Masks {
+        &self.masks
     }
 
     /// The mask from `attention` per cell; S at a pixel is what
@@ -100,41 +112,41 @@ impl Roi {
         if let Some(fraction) = self.rectangle {
             self.mark_rectangle(f64::from(fraction));
         } else if self.full_frame {
-            self.salient.reset(self.size);
-            self.salient.fill();
-            self.matched.copy_from(&self.salient);
-            self.area = self.matched.count();
+            self.masks.salient.reset(self.size);
+            self.masks.salient.fill();
+            self.masks.matched.copy_from(&self.masks.salient);
+            self.area = self.masks.matched.count();
         } else {
             let threshold = self.threshold.unwrap_or_else(|| otsu(attention));
-            self.salient.set_from_cells(self.level, attention, self.size, threshold);
+            self.masks.salient.set_from_cells(self.level, attention, self.size, threshold);
             self.gate_depth(coarse, rig);
-            self.salient.open(OPENING);
-            self.salient.close(CLOSING);
-            self.components.remove_small(&mut self.salient, self.min_area);
+            self.masks.salient.open(OPENING);
+            self.masks.salient.close(CLOSING);
+            self.components.remove_small(&mut self.masks.salient, self.min_area);
             self.dilate();
             self.keep_budget(attention);
         }
-        self.salient.write(self.level, &mut out.salient);
-        self.matched.write(self.level, &mut out.matched);
+        self.masks.salient.write(self.level, &mut out.salient);
+        self.masks.matched.write(self.level, &mut out.matched);
         out.fraction = self.area as f32 / self.size.area().max(1) as f32;
     }
 
     /// A rectangle of the image's aspect around its centre.
     fn mark_rectangle(&mut self, fraction: f64) {
-        self.salient.reset(self.size);
+        self.masks.salient.reset(self.size);
         let side = |length: usize| {
             let part = (length as f64 * fraction.sqrt()).round() as usize;
             let start = (length - part) / 2;
             (start, start + part)
         };
-        self.salient.set_rectangle(side(self.size.width), side(self.size.height));
+        self.masks.salient.set_rectangle(side(self.size.width), side(self.size.height));
         self.dilate();
     }
 
     fn dilate(&mut self) {
-        self.matched.copy_from(&self.salient);
-        self.matched.dilate(self.dilation);
-        self.area = self.matched.count();
+        self.masks.matched.copy_from(&self.masks.salient);
+        self.masks.matched.dilate(self.dilation);
+        self.area = self.masks.matched.count();
     }
 
     /// Keeps `Z_min <= Z <= Z_max`, as `f B / Z_max <= d <= f B / Z_min`.
@@ -142,7 +154,7 @@ impl Roi {
         let offset = rig.disparity_offset() as f32;
         let least = (rig.depth_scale() / self.depth_m.1) as f32 + offset - SLACK;
         let most = (rig.depth_scale() / self.depth_m.0) as f32 + offset + SLACK;
-        retain_cells(&mut self.salient, |x, y| {
+        retain_cells(&mut self.masks.salient, |x, y| {
             let d = coarse.checked.get(x, y);
             // NaN is neither.
             !(d < least || d > most)
@@ -152,10 +164,10 @@ impl Roi {
     fn keep_budget(&mut self, attention: &Image<f32>) {
         let limit = (self.max_fraction.min(self.allowance) * self.size.area() as f64) as usize;
         if self.area > limit {
-            self.budget.choose(&self.matched, attention, limit);
-            self.budget.apply(&mut self.matched);
-            self.budget.apply(&mut self.salient);
-            self.area = self.matched.count();
+            self.budget.choose(&self.masks.matched, attention, limit);
+            self.budget.apply(&mut self.masks.matched);
+            self.budget.apply(&mut self.masks.salient);
+            self.area = self.masks.matched.count();
         }
     }
 }

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
-use salient_stereo::perception::{Region, RegionList, Rejections, RoiMask, View};
+use salient_stereo::perception::{Region, RegionList, Rejections, View};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::depth::Depth;
@@ -16,7 +16,10 @@ use salient_stereo::stage::regions::components::{Components, agree};
 use salient_stereo::stage::regions::contour::Contour;
 use salient_stereo::stage::regions::measure::Measure;
 use salient_stereo::stage::regions::{RegionSource, Regions, priority};
+use salient_stereo::stage::roi::Masks;
 use salient_stereo::stage::saliency::upsample;
+
+use super::reference::roi::bits;
 
 const F: f64 = 100.0;
 const BASELINE: f64 = 0.5;
@@ -310,7 +313,7 @@ impl Boxes {
         }
     }
 
-    fn source<'a>(&'a self, rig: &'a StereoRig, roi: &'a RoiMask) -> RegionSource<'a> {
+    fn source<'a>(&'a self, rig: &'a StereoRig, roi: &'a Masks) -> RegionSource<'a> {
         RegionSource {
             left: &self.left,
             attention: &self.attention,
@@ -326,8 +329,8 @@ impl Boxes {
 
     fn run(&self, config: &Config) -> (Image<u16>, RegionList, Rejections) {
         let rig = rig(self.size);
-        let roi =
-            RoiMask { salient: self.salient.clone(), matched: self.salient.clone(), fraction: 0.5 };
+        let salient = bits(&Image::from_fn(self.size, |x, y| self.salient.get(x, y) != 0));
+        let roi = Masks { matched: salient.clone(), salient };
         let source = self.source(&rig, &roi);
         let mut outs = simd::available().into_iter().map(|level| {
             let mut out = (Image::default(), RegionList::default(), Rejections::default());
@@ -453,7 +456,7 @@ fn a_post_that_was_followed_is_located_by_its_box() {
     let mut scene = Boxes::new(64, 96);
     scene.add(30, 44, 4, 44, |_, _| 10.0);
     let rig = rig(scene.size);
-    let roi = RoiMask::default();
+    let roi = Masks::default();
     let source = scene.source(&rig, &roi);
     let mut candidates =
         Candidates { ids: Image::new(scene.size), first: 1, ..Candidates::default() };

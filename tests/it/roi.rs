@@ -12,7 +12,7 @@ use salient_stereo::stage::roi::cells::{Components, count_cells, retain_cells};
 use salient_stereo::stage::roi::threshold::otsu;
 use salient_stereo::stage::saliency::upsample;
 
-use super::reference::roi::{self as plain, Mask};
+use super::reference::roi::{self as plain, Mask, bits};
 use super::reference::{Noise, ODD_SIZES};
 
 /// A mask of blobs and specks.
@@ -21,13 +21,6 @@ fn blobs(size: Size, seed: u64) -> Mask {
     let specks = Image::from_fn(size, |_, _| noise.next().is_multiple_of(23));
     let grown = plain::dilate(&specks, 2);
     Image::from_fn(size, |x, y| grown.get(x, y) != noise.next().is_multiple_of(31))
-}
-
-fn bits(mask: &Mask) -> BitMask {
-    let map = Image::from_fn(mask.size(), |x, y| f32::from(u8::from(mask.get(x, y))));
-    let mut bits = BitMask::default();
-    bits.set_from(simd::detect(), &map, 0.5);
-    bits
 }
 
 fn flags(bits: &BitMask) -> Mask {

@@ -4,16 +4,18 @@
 use salient_stereo::camera::{Camera, StereoRig};
 use salient_stereo::config::Config;
 use salient_stereo::image::{Image, Size};
-use salient_stereo::perception::{RegionList, Rejections, RoiMask, View};
+use salient_stereo::perception::{RegionList, Rejections, View};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::ground::{GroundState, Plane, cell_centre};
 use salient_stereo::stage::regions::{RegionSource, Regions};
+use salient_stereo::stage::roi::Masks;
 use salient_stereo::stage::saliency::{Previous, Saliency, Scene};
 use salient_stereo::stage::table::Table;
 use salient_stereo::stamp::Stamp;
 
 use super::reference::Noise;
+use super::reference::roi::bits;
 
 const SIZE: Size = Size::new(640, 480);
 const F: f64 = 700.0;
@@ -207,12 +209,12 @@ fn ground_and_table_do_not_take_turns() {
 /// Regions on `plane` where all is salient, and how many candidates were refused.
 fn regions_on(plane: &Plane, disparity: &Image<f32>) -> (RegionList, Rejections) {
     let rig = rig();
-    let salient = Image::filled(SIZE, 255);
+    let salient = bits(&Image::filled(SIZE, true));
     let config = Config::default();
     let source = RegionSource {
         left: &View::default(),
         attention: &Image::filled(SIZE.divided_by(4), 0.8),
-        roi: &RoiMask { salient: salient.clone(), matched: salient, fraction: 1.0 },
+        roi: &Masks { matched: salient.clone(), salient },
         disparity,
         coarse: &CoarseDisparity::default(),
         confidence: &Image::filled(SIZE, 0.9),

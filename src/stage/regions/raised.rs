@@ -26,6 +26,7 @@ pub struct Raised {
     level: Level,
     relief: Image<f32>,
     high: BitMask,
+    salient: Image<u8>,
     mask: Image<u8>,
     near: Image<u8>,
     /// Per pixel of a box whether it is connected with the box's edge.
@@ -43,6 +44,7 @@ impl Raised {
             level,
             relief: Image::default(),
             high: BitMask::default(),
+            salient: Image::default(),
             mask: Image::default(),
             near: Image::default(),
             outside: Vec::new(),
@@ -68,8 +70,10 @@ impl Raised {
     ) -> u32 {
         let size = source.disparity.size();
         self.relief.resize(size);
+        source.roi.salient.write(self.level, &mut self.salient);
+        source.roi.matched.write(self.level, &mut self.mask);
         for y in 0..size.height {
-            let pixels = source.disparity.row(y).iter().zip(source.roi.matched.row(y));
+            let pixels = source.disparity.row(y).iter().zip(self.mask.row(y));
             let row = self.relief.row_mut(y).iter_mut().zip(pixels);
             for (x, (out, (&d, &matched))) in row.enumerate() {
                 let relief = d - plane.disparity(x as f32, y as f32);
@@ -83,14 +87,14 @@ impl Raised {
         self.high.dilate(REACH);
         self.high.write(self.level, &mut self.near);
         for y in 0..size.height {
-            let known = self.relief.row(y).iter().zip(source.roi.salient.row(y));
+            let known = self.relief.row(y).iter().zip(self.salient.row(y));
             let row = self.mask.row_mut(y).iter_mut().zip(self.near.row(y)).zip(known);
             for ((out, &near), (&relief, &salient)) in row {
                 *out |= if relief.is_nan() { near & salient } else { 0 };
             }
         }
         components.run(&self.mask, source.disparity, out);
-        self.drop_unmeasured(source, out);
+        self.drop_unmeasured(out);
         for index in 0..out.boxes.len() {
             let bounds = out.boxes[index];
             if bounds.area > 0 {
@@ -102,13 +106,13 @@ impl Raised {
         for id in 1..=out.boxes.len() as u32 {
             self.part.run(id, out);
         }
-        self.drop_unmeasured(source, out);
+        self.drop_unmeasured(out);
         joined
     }
 
     /// Of what little was measured nothing is known, however large it is.
-    fn drop_unmeasured(&mut self, source: &RegionSource<'_>, candidates: &mut Candidates) {
-        self.weigh(source, candidates);
+    fn drop_unmeasured(&mut self, candidates: &mut Candidates) {
+        self.weigh(candidates);
         for (bounds, _) in
             candidates.boxes.iter_mut().zip(&self.evidence).filter(|(_, e)| **e < LEAST_EVIDENCE)
         {
@@ -117,12 +121,12 @@ impl Raised {
     }
 
     /// Counts the salient pixels of each candidate whose relief was measured.
-    fn weigh(&mut self, source: &RegionSource<'_>, candidates: &Candidates) {
+    fn weigh(&mut self, candidates: &Candidates) {
         self.evidence.clear();
         self.evidence.resize(candidates.boxes.len(), 0);
         for y in 0..self.relief.height() {
             let measured = candidates.ids.row(y).iter().zip(self.relief.row(y));
-            for ((&id, &relief), &salient) in measured.zip(source.roi.salient.row(y)) {
+            for ((&id, &relief), &salient) in measured.zip(self.salient.row(y)) {
                 if id != 0 && salient != 0 && relief >= RELIEF_PX {
                     self.evidence[id as usize - 1] += 1;
                 }

@@ -10,15 +10,15 @@ use super::RegionSource;
 use super::candidates::Candidates;
 use super::runs::{Spans, edge_words, find_edges};
 use super::trim::{NARROW_M, Trim};
-use crate::image::Image;
+use crate::image::{Image, Size};
 use crate::perception::Rejections;
-use crate::simd::{LANES, Level, Simd, dispatch, padded, prelude::*, u8x32};
+use crate::simd::{Level, dispatch};
 use crate::stage::ground::Plane;
-use crate::stage::roi::bits::{BitMask, first_set, last_set};
+use crate::stage::roi::bits::{BitMask, bits_from, even_bits, first_set, last_set};
 use crate::stage::standing::{HIGH, Standing, Things, WIDE, size_scale};
 use paint::Painter;
 use post::{Posts, Stump};
-use shrink::{even_bits, shrink};
+use shrink::shrink;
 
 /// Share of a thing's cells that must be salient.
 const LEAST_SALIENT: f32 = 0.3;
@@ -82,7 +82,7 @@ impl Upright {
     }
 
     /// Numbers the things that are salient; returns how many.
-    fn choose(&mut self, salient: &Image<u8>) -> usize {
+    fn choose(&mut self, salient: &BitMask) -> usize {
         self.salient.clear();
         self.salient.resize(self.things.list.len(), 0);
         self.number.clear();
@@ -96,8 +96,9 @@ impl Upright {
                 find_edges(simd, row, edges);
                 let Some(first) = first_set(edges, 0) else { continue };
                 let end = last_set(edges, row.len() + 1).unwrap_or(first);
-                let pixels = salient.row((cy * HIGH + HIGH / 2).min(salient.height() - 1));
-                right_pixels(simd, pixels, first..end, bits);
+                let Size { width, height } = salient.size();
+                let pixels = salient.row((cy * HIGH + HIGH / 2).min(height - 1));
+                right_pixels(pixels, width, first..end, bits);
                 for cells in Spans::new(edges) {
                     if let Some(thing) = row[cells.start].checked_sub(1) {
                         number[thing as usize] += cells.len() as u32;
@@ -157,21 +158,18 @@ impl Upright {
     }
 }
 
-/// Sets the bits of those of `cells`, and of others, whose right pixel is not 0; the last
-/// column may have none, and its left one tells.
+/// Sets the bits of those of `cells`, and of others, whose right pixel is set in a row of
+/// `width` pixels; the last column may have none, and its left one tells.
 #[inline(always)]
-fn right_pixels<S: Simd>(simd: S, pixels: &[u8], cells: Range<usize>, bits: &mut [u64]) {
-    bits.fill(0);
-    let first = cells.start * WIDE / LANES * LANES;
-    for x in (first..pixels.len().min(cells.end * WIDE)).step_by(LANES) {
-        let pixels: u8x32<S> = padded(simd, pixels, x, 0);
-        let set = !pixels.simd_eq(0).to_bitmask() >> 1;
-        let cell = x / WIDE;
-        bits[cell / 64] |= even_bits(set) << (cell % 64);
+fn right_pixels(pixels: &[u64], width: usize, cells: Range<usize>, bits: &mut [u64]) {
+    for index in cells.start / 64..cells.end.div_ceil(64) {
+        let [low, high] =
+            [0, 64].map(|at| even_bits(bits_from(pixels, index * WIDE * 64 + at) >> 1));
+        bits[index] = low | high << 32;
     }
-    if let Some(last) = pixels.as_chunks::<WIDE>().1.first() {
-        let cell = pixels.len() / WIDE;
-        bits[cell / 64] |= u64::from(*last != 0) << (cell % 64);
+    if !width.is_multiple_of(WIDE) {
+        let cell = width / WIDE;
+        bits[cell / 64] |= (bits_from(pixels, width - 1) & 1) << (cell % 64);
     }
 }
 
@@ -194,22 +192,23 @@ const _: () = assert!(WIDE == 2);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simd;
 
     #[test]
     fn the_right_pixel_of_a_cell_tells() {
         for width in [1, 2, 3, 31, 32, 33, 64, 127, 128, 129, 260] {
-            let pixels: Vec<u8> = (0..width).map(|x| if x * x % 7 < 3 { 255 } else { 0 }).collect();
+            let pixels: Vec<bool> = (0..width).map(|x| x * x % 7 < 3).collect();
             let cells: Vec<bool> =
-                pixels.chunks(2).map(|cell| cell.last().is_some_and(|pixel| *pixel != 0)).collect();
-            for level in simd::available() {
-                for start in 0..cells.len() {
-                    for end in start + 1..=cells.len() {
-                        let mut bits = vec![u64::MAX; edge_words(cells.len())];
-                        dispatch!(level, simd => right_pixels(simd, &pixels, start..end, &mut bits));
-                        let expected = cells[start..end].iter().filter(|set| **set).count();
-                        assert_eq!(count_set(&bits, start..end) as usize, expected);
-                    }
+                pixels.chunks(2).map(|cell| cell.last().is_some_and(|pixel| *pixel)).collect();
+            let mut words = vec![0; pixels.len().div_ceil(64)];
+            for (x, pixel) in pixels.iter().enumerate() {
+                words[x / 64] |= u64::from(*pixel) << (x % 64);
+            }
+            for start in 0..cells.len() {
+                for end in start + 1..=cells.len() {
+                    let mut bits = vec![u64::MAX; edge_words(cells.len())];
+                    right_pixels(&words, width, start..end, &mut bits);
+                    let expected = cells[start..end].iter().filter(|set| **set).count();
+                    assert_eq!(count_set(&bits, start..end) as usize, expected);
                 }
             }
         }

@@ -232,6 +232,26 @@ fn compare_row<S: Simd>(simd: S, values: &[f32], threshold: f32, words: &mut [u6
     }
 }
 
+/// The 64 bits from bit `from` on; beyond the end they are 0.
+#[inline(always)]
+pub fn bits_from(words: &[u64], from: usize) -> u64 {
+    let word = |index: usize| words.get(index).copied().unwrap_or(0);
+    let (index, shift) = (from / WORD, from % WORD);
+    // In two steps, as nothing is shifted by 64.
+    word(index) >> shift | word(index + 1) << 1 << (WORD - 1 - shift)
+}
+
+/// The even ones of the bits, side by side.
+#[inline(always)]
+pub const fn even_bits(bits: u64) -> u64 {
+    let mut bits = bits & 0x5555_5555_5555_5555;
+    bits = (bits | bits >> 1) & 0x3333_3333_3333_3333;
+    bits = (bits | bits >> 2) & 0x0f0f_0f0f_0f0f_0f0f;
+    bits = (bits | bits >> 4) & 0x00ff_00ff_00ff_00ff;
+    bits = (bits | bits >> 8) & 0x0000_ffff_0000_ffff;
+    (bits | bits >> 16) & 0xffff_ffff
+}
+
 /// The first set bit from bit `from` on.
 pub fn first_set(words: &[u64], from: usize) -> Option<usize> {
     let mut index = from / WORD;
@@ -296,5 +316,19 @@ mod tests {
         assert_eq!(last_set(&words, 192), Some(133));
         assert_eq!(last_set(&words, 133), Some(63));
         assert_eq!(last_set(&words, 63), None);
+    }
+
+    #[test]
+    fn bits_are_taken_from_any_place() {
+        let words = [0x8000_0000_0000_0001, 0x5, 0xf0f0_f0f0_f0f0_f0f0];
+        let bit = |i: usize| words.get(i / 64).map_or(0, |word| word >> (i % 64) & 1);
+        for from in 0..200 {
+            let expected = (0..64).fold(0, |bits, i| bits | bit(from + i) << i);
+            assert_eq!(bits_from(&words, from), expected, "{from}");
+        }
+        for word in words {
+            let expected = (0..32).fold(0, |bits, i| bits | (word >> (2 * i) & 1) << i);
+            assert_eq!(even_bits(word), expected);
+        }
     }
 }

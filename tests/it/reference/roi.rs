@@ -1,11 +1,21 @@
 //! Regions of interest by their definitions.
 
 use salient_stereo::image::{Image, Size};
+use salient_stereo::simd;
+use salient_stereo::stage::roi::bits::BitMask;
 
 use super::window;
 
 /// A mask as one flag per pixel.
 pub type Mask = Image<bool>;
+
+/// The same in bits.
+pub fn bits(mask: &Mask) -> BitMask {
+    let map = Image::from_fn(mask.size(), |x, y| f32::from(u8::from(mask.get(x, y))));
+    let mut bits = BitMask::default();
+    bits.set_from(simd::detect(), &map, 0.5);
+    bits
+}
 
 /// Set where any pixel within `radius` is set.
 pub fn dilate(mask: &Mask, radius: usize) -> Mask {

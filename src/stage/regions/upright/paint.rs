@@ -6,7 +6,7 @@ use crate::stage::regions::RegionSource;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
 use crate::stage::regions::components::tolerance;
 use crate::stage::regions::runs::run;
-use crate::stage::roi::bits::{BitMask, first_set, last_set};
+use crate::stage::roi::bits::{BitMask, bits_from, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};
 
 /// Largest difference of a pixel from its surface in parts of the disparity.
@@ -197,9 +197,7 @@ impl Painter {
                     let mut bits = on.to_bitmask() & all;
                     let holes = !d.simd_eq(d).to_bitmask() & own & all;
                     if holes != 0 {
-                        let matched: u8x16<S> = padded(simd, source.roi.matched.row(y), x, 0);
-                        let zero = u8x16::splat(simd, 0);
-                        let none = matched.simd_eq(zero).to_bitmask();
+                        let none = !bits_from(source.roi.matched.row(y), x);
                         // The left pixel of a cell tells.
                         bits |= holes & (inside | ((none & LEFT) * CELL_BITS));
                     }

@@ -1,10 +1,10 @@
 //! From pixels to cells: the median disparity of each.
 
 use crate::image::Image;
-use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, padded, prelude::*, u8x32};
+use crate::simd::{Level, Simd, dispatch, f32x16, mask32x16, padded, prelude::*};
 use crate::stage::coarse::CELL;
 use crate::stage::regions::RegionSource;
-use crate::stage::roi::bits::BitMask;
+use crate::stage::roi::bits::{BitMask, bits_from, even_bits};
 use crate::stage::standing::{HIGH, WIDE, cells};
 
 /// Places in a cell whose disparities are asked; their median is the cell's.
@@ -46,7 +46,7 @@ pub fn shrink(level: Level, source: &RegionSource<'_>, map: &mut Image<f32>, fin
 struct Row<'a> {
     disparity: [&'a [f32]; HIGH],
     /// The first and the last row.
-    matched: [&'a [u8]; 2],
+    matched: [&'a [u64]; 2],
     coarse: &'a [f32],
     offset: f32,
 }
@@ -61,7 +61,7 @@ impl Row<'_> {
             let coarse = coarse - self.offset;
             let mut values = coarse.zip_low(coarse);
             let [upper, lower] = self.matched;
-            let matched = cells_of(simd, padded(simd, upper, x, 0), padded(simd, lower, x, 0));
+            let matched = cells_of(upper, lower, x);
             if matched != 0 {
                 let medians = medians_of(simd, &self.disparity, x);
                 let known = medians.simd_eq(medians).to_bitmask() & matched;
@@ -77,22 +77,12 @@ impl Row<'_> {
     }
 }
 
-/// One bit for each cell of which a pixel of one of two rows is not 0.
+/// One bit for each of [`LANES`] cells from pixel `x` on of which a pixel of one of two
+/// rows is set.
 #[inline(always)]
-fn cells_of<S: Simd>(simd: S, upper: u8x32<S>, lower: u8x32<S>) -> u64 {
-    let any = upper | lower;
-    let bits = !any.simd_eq(u8x32::splat(simd, 0)).to_bitmask();
-    even_bits(bits | bits >> 1)
-}
-
-/// The even ones of 32 bits, side by side.
-#[inline(always)]
-pub const fn even_bits(bits: u64) -> u64 {
-    let mut bits = bits & 0x5555_5555;
-    bits = (bits | bits >> 1) & 0x3333_3333;
-    bits = (bits | bits >> 2) & 0x0f0f_0f0f;
-    bits = (bits | bits >> 4) & 0x00ff_00ff;
-    (bits | bits >> 8) & 0xffff
+fn cells_of(upper: &[u64], lower: &[u64], x: usize) -> u64 {
+    let any = bits_from(upper, x) | bits_from(lower, x);
+    even_bits(any | any >> 1) & (1 << LANES) - 1
 }
 
 /// Median disparity of some of the pixels of each of several cells, whose rows
