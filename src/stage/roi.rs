@@ -4,6 +4,7 @@ pub mod bits;
 pub mod budget;
 pub mod cells;
 pub mod latency;
+pub mod morphology;
 pub mod threshold;
 
 use crate::camera::StereoRig;
@@ -16,6 +17,7 @@ use crate::stage::coarse::CoarseDisparity;
 use bits::BitMask;
 use budget::Budget;
 use cells::{Components, retain_cells};
+use morphology::Morphology;
 use threshold::otsu;
 
 /// Radius in pixels of the opening: filaments of one and two pixels are cut.
@@ -48,6 +50,7 @@ pub struct Roi {
     max_fraction: f64,
     allowance: f64,
     masks: Masks,
+    morphology: Morphology,
     /// Pixels of `matched`.
     area: usize,
     components: Components,
@@ -72,6 +75,7 @@ impl Roi {
             max_fraction: config.roi.max_fraction,
             allowance: 1.0,
             masks: Masks::default(),
+            morphology: Morphology::new(level),
             area: 0,
             components: Components::default(),
             budget: Budget::default(),
@@ -115,13 +119,13 @@ impl Roi {
             self.masks.salient.reset(self.size);
             self.masks.salient.fill();
             self.masks.matched.copy_from(&self.masks.salient);
-            self.area = self.masks.matched.count();
+            self.area = self.masks.matched.count(self.level);
         } else {
             let threshold = self.threshold.unwrap_or_else(|| otsu(attention));
             self.masks.salient.set_from_cells(self.level, attention, self.size, threshold);
             self.gate_depth(coarse, rig);
-            self.masks.salient.open(OPENING);
-            self.masks.salient.close(CLOSING);
+            self.morphology.open(&mut self.masks.salient, OPENING);
+            self.morphology.close(&mut self.masks.salient, CLOSING);
             self.components.remove_small(&mut self.masks.salient, self.min_area);
             self.dilate();
             self.keep_budget(attention);
@@ -144,9 +148,9 @@ impl Roi {
     }
 
     fn dilate(&mut self) {
-        self.masks.matched.copy_from(&self.masks.salient);
-        self.masks.matched.dilate(self.dilation);
-        self.area = self.masks.matched.count();
+        let Masks { salient, matched } = &mut self.masks;
+        self.morphology.dilate_into(salient, self.dilation, matched);
+        self.area = self.masks.matched.count(self.level);
     }
 
     /// Keeps `Z_min <= Z <= Z_max`, as `f B / Z_max <= d <= f B / Z_min`.
@@ -167,7 +171,7 @@ impl Roi {
             self.budget.choose(&self.masks.matched, attention, limit);
             self.budget.apply(&mut self.masks.matched);
             self.budget.apply(&mut self.masks.salient);
-            self.area = self.masks.matched.count();
+            self.area = self.masks.matched.count(self.level);
         }
     }
 }

@@ -9,6 +9,7 @@ use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::roi::Roi;
 use salient_stereo::stage::roi::bits::BitMask;
 use salient_stereo::stage::roi::cells::{Components, count_cells, retain_cells};
+use salient_stereo::stage::roi::morphology::Morphology;
 use salient_stereo::stage::roi::threshold::otsu;
 use salient_stereo::stage::saliency::upsample;
 
@@ -26,7 +27,9 @@ fn blobs(size: Size, seed: u64) -> Mask {
 fn flags(bits: &BitMask) -> Mask {
     let mut bytes = Image::default();
     bits.write(simd::detect(), &mut bytes);
-    assert_eq!(bits.count(), set_pixels(&bytes));
+    for level in simd::available() {
+        assert_eq!(bits.count(level), set_pixels(&bytes));
+    }
     assert!(bytes.pixels().iter().all(|&v| v == 0 || v == 255));
     of(&bytes)
 }
@@ -54,7 +57,7 @@ fn a_mask_of_bits_holds_what_was_put_in() {
         }
         let nothing = Image::filled(size, f32::NAN);
         bits.set_from(simd::detect(), &nothing, 0.0);
-        assert_eq!(bits.count(), 0, "NaN is not salient");
+        assert_eq!(bits.count(simd::detect()), 0, "NaN is not salient");
     }
 }
 
@@ -62,15 +65,22 @@ fn a_mask_of_bits_holds_what_was_put_in() {
 fn a_mask_of_cells_is_that_of_their_pixels() {
     let sizes = [1, 2, 61, 64, 67, 72, 131, 331].map(|width| Size::new(width, 23));
     for size in ODD_SIZES.into_iter().chain(sizes) {
-        let cells = Noise(1).map(size.divided_by(4));
+        let noise = Noise(1).map(size.divided_by(4));
+        // Wide plains, where all pixels of many cells are alike.
+        let waves = Image::from_fn(noise.size(), |x, y| {
+            let wave = (0.11 * x as f32).sin() * (0.9 * y as f32).cos();
+            (0.5 + 2.0 * wave).clamp(0.0, 1.0)
+        });
         let (mut map, mut expected, mut bits) =
             (Image::default(), BitMask::default(), BitMask::default());
-        upsample(simd::detect(), &cells, size, &mut map);
-        for threshold in [0.0, 0.3, 0.8, 0.97] {
-            expected.set_from(simd::detect(), &map, threshold);
-            for level in simd::available() {
-                bits.set_from_cells(level, &cells, size, threshold);
-                assert_eq!(bits, expected, "{size}, {threshold}, {level:?}");
+        for cells in [noise, waves] {
+            upsample(simd::detect(), &cells, size, &mut map);
+            for threshold in [0.0, 0.3, 0.8, 0.97] {
+                expected.set_from(simd::detect(), &map, threshold);
+                for level in simd::available() {
+                    bits.set_from_cells(level, &cells, size, threshold);
+                    assert_eq!(bits, expected, "{size}, {threshold}, {level:?}");
+                }
             }
         }
     }
@@ -81,17 +91,24 @@ fn morphology_equals_its_definition() {
     for size in ODD_SIZES {
         let mask = blobs(size, 2);
         for radius in [0, 1, 2, 3, 7, 33, 64, 150] {
-            let change = |f: &dyn Fn(&mut BitMask)| {
-                let mut bits = bits(&mask);
-                f(&mut bits);
-                flags(&bits)
-            };
             let (dilated, eroded) = (plain::dilate(&mask, radius), plain::erode(&mask, radius));
-            assert_eq!(change(&|b| b.dilate(radius)), dilated, "{size}, {radius}");
-            assert_eq!(change(&|b| b.erode(radius)), eroded, "{size}, {radius}");
             let (opened, closed) = (plain::dilate(&eroded, radius), plain::erode(&dilated, radius));
-            assert_eq!(change(&|b| b.open(radius)), opened, "{size}, {radius}");
-            assert_eq!(change(&|b| b.close(radius)), closed, "{size}, {radius}");
+            for level in simd::available() {
+                let mut morphology = Morphology::new(level);
+                let mut change = |f: &dyn Fn(&mut Morphology, &mut BitMask)| {
+                    let mut bits = bits(&mask);
+                    f(&mut morphology, &mut bits);
+                    flags(&bits)
+                };
+                let what = format!("{size}, {radius}, {level:?}");
+                assert_eq!(change(&|m, b| m.dilate(b, radius)), dilated, "{what}");
+                assert_eq!(change(&|m, b| m.erode(b, radius)), eroded, "{what}");
+                assert_eq!(change(&|m, b| m.open(b, radius)), opened, "{what}");
+                assert_eq!(change(&|m, b| m.close(b, radius)), closed, "{what}");
+                let mut out = bits(&Image::filled(Size::new(40, 9), true));
+                morphology.dilate_into(&bits(&mask), radius, &mut out);
+                assert_eq!(flags(&out), dilated, "{what}");
+            }
         }
     }
 }

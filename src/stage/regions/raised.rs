@@ -9,6 +9,7 @@ use crate::image::Image;
 use crate::simd::Level;
 use crate::stage::ground::Plane;
 use crate::stage::roi::bits::BitMask;
+use crate::stage::roi::morphology::Morphology;
 use crate::stage::table::RELIEF_PX;
 
 /// Fewest salient pixels with measured relief that are a thing: the 5x5 cells
@@ -26,6 +27,7 @@ pub struct Raised {
     level: Level,
     relief: Image<f32>,
     high: BitMask,
+    morphology: Morphology,
     salient: Image<u8>,
     mask: Image<u8>,
     near: Image<u8>,
@@ -44,6 +46,7 @@ impl Raised {
             level,
             relief: Image::default(),
             high: BitMask::default(),
+            morphology: Morphology::new(level),
             salient: Image::default(),
             mask: Image::default(),
             near: Image::default(),
@@ -81,10 +84,10 @@ impl Raised {
             }
         }
         self.high.set_from(self.level, &self.relief, RELIEF_PX);
-        self.high.open(OPENING);
-        self.high.close(CLOSING);
+        self.morphology.open(&mut self.high, OPENING);
+        self.morphology.close(&mut self.high, CLOSING);
         self.high.write(self.level, &mut self.mask);
-        self.high.dilate(REACH);
+        self.morphology.dilate(&mut self.high, REACH);
         self.high.write(self.level, &mut self.near);
         for y in 0..size.height {
             let known = self.relief.row(y).iter().zip(self.salient.row(y));

@@ -1,14 +1,14 @@
-//! A mask of one bit per pixel: 64 pixels are dilated by one instruction.
+//! A mask of one bit per pixel.
 
 use rayon::prelude::*;
 
 use crate::image::{Image, Size};
 use crate::simd::{Level, Simd, dispatch, f32x16, mask8x64, prelude::*, u8x64};
 use crate::stage::coarse::CELL;
-use crate::stage::saliency::upsample::Rows;
+use crate::stage::saliency::upsample::compare;
 
 /// Pixels per word; pixel `x` of a row is bit `x % 64` of its word `x / 64`.
-const WORD: usize = u64::BITS as usize;
+pub(super) const WORD: usize = u64::BITS as usize;
 
 /// A binary mask. The bits beyond the width are 0.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,9 +21,15 @@ pub struct BitMask {
 impl BitMask {
     /// Changes the size and clears all bits.
     pub fn reset(&mut self, size: Size) {
+        self.words.clear();
+        self.resize(size);
+    }
+
+    /// Changes the size. The bits are unspecified afterwards: whoever resizes writes
+    /// them all.
+    pub(super) fn resize(&mut self, size: Size) {
         self.size = size;
         self.stride = size.width.div_ceil(WORD);
-        self.words.clear();
         self.words.resize(self.stride * size.height, 0);
     }
 
@@ -51,8 +57,8 @@ impl BitMask {
     }
 
     /// Number of set bits.
-    pub fn count(&self) -> usize {
-        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    pub fn count(&self, level: Level) -> usize {
+        dispatch!(level, _simd => count_words(&self.words))
     }
 
     /// Sets every bit.
@@ -87,13 +93,15 @@ impl BitMask {
     /// The pixels of an image of `size` at which [`upsample`](crate::stage::saliency::upsample)
     /// makes at least `threshold` of a map over its cells.
     pub fn set_from_cells(&mut self, level: Level, cells: &Image<f32>, size: Size, threshold: f32) {
-        self.reset(size);
         if size.is_empty() || cells.size() != size.divided_by(CELL) {
+            self.reset(size);
             return;
         }
-        self.words.par_chunks_exact_mut(self.stride).with_min_len(32).enumerate().for_each(
+        self.resize(size);
+        // Whole rows of cells, of which the last one may have fewer rows of pixels.
+        self.words.par_chunks_mut(CELL * self.stride).with_min_len(8).enumerate().for_each(
             |(y, words)| {
-                dispatch!(level, simd => Rows::at(cells, y).compare(simd, threshold, words));
+                dispatch!(level, simd => compare(simd, cells, y, threshold, words));
             },
         );
         self.clear_tails();
@@ -113,106 +121,32 @@ impl BitMask {
             .for_each(|(row, words)| dispatch!(level, simd => write_row(simd, words, row)));
     }
 
-    /// Sets every pixel that has a set pixel within `radius` rows and columns.
-    pub fn dilate(&mut self, radius: usize) {
-        if self.words.is_empty() {
-            return;
-        }
-        for row in self.words.chunks_exact_mut(self.stride) {
-            for step in steps(radius) {
-                towards_higher(row, step);
-            }
-            for step in steps(radius) {
-                towards_lower(row, step);
-            }
-        }
-        for step in steps(radius) {
-            // Downwards: rows from the last on, so that sources are still unchanged.
-            for y in (step..self.size.height).rev() {
-                let (above, here) = self.words.split_at_mut(y * self.stride);
-                merge(&mut here[..self.stride], &above[(y - step) * self.stride..]);
-            }
-        }
-        for step in steps(radius) {
-            for y in step..self.size.height {
-                let (above, here) = self.words.split_at_mut(y * self.stride);
-                merge(&mut above[(y - step) * self.stride..][..self.stride], here);
-            }
-        }
-        self.clear_tails();
+    /// Words of a row.
+    pub(super) const fn row_words(&self) -> usize {
+        self.stride
     }
 
-    /// Clears every pixel that has a cleared pixel of the image within `radius`
-    /// rows and columns.
-    pub fn erode(&mut self, radius: usize) {
-        self.invert();
-        self.dilate(radius);
-        self.invert();
-    }
-
-    /// Erosion, then dilation: removes what is thinner than `2 radius + 1` pixels.
-    pub fn open(&mut self, radius: usize) {
-        self.erode(radius);
-        self.dilate(radius);
-    }
-
-    /// Dilation, then erosion: fills gaps of up to `2 radius` pixels.
-    pub fn close(&mut self, radius: usize) {
-        self.dilate(radius);
-        self.erode(radius);
-    }
-
-    fn invert(&mut self) {
-        for word in &mut self.words {
-            *word = !*word;
+    /// The bits of a row's last word that are pixels.
+    pub(super) const fn tail(&self) -> u64 {
+        match self.size.width % WORD {
+            0 => u64::MAX,
+            used => (1 << used) - 1,
         }
-        self.clear_tails();
     }
 
     fn clear_tails(&mut self) {
-        let used = self.size.width % WORD;
-        if used != 0 {
+        let tail = self.tail();
+        if tail != u64::MAX {
             for row in self.words.chunks_exact_mut(self.stride) {
-                row[self.stride - 1] &= (1 << used) - 1;
+                row[self.stride - 1] &= tail;
             }
         }
     }
 }
 
-/// Shifts that together spread a bit over every distance up to `radius`: each
-/// may be one more than the distance already covered.
-fn steps(radius: usize) -> impl Iterator<Item = usize> {
-    let mut covered = 0;
-    std::iter::from_fn(move || {
-        let step = (covered + 1).min(radius - covered).min(WORD - 1);
-        covered += step;
-        (step > 0).then_some(step)
-    })
-}
-
-/// Sets in one row what is set in another.
-fn merge(row: &mut [u64], other: &[u64]) {
-    for (word, other) in row.iter_mut().zip(other) {
-        *word |= other;
-    }
-}
-
-fn towards_higher(row: &mut [u64], step: usize) {
-    let mut before = 0;
-    for word in row {
-        let here = *word;
-        *word |= here << step | before >> (WORD - step);
-        before = here;
-    }
-}
-
-fn towards_lower(row: &mut [u64], step: usize) {
-    let mut after = 0;
-    for word in row.iter_mut().rev() {
-        let here = *word;
-        *word |= here >> step | after << (WORD - step);
-        after = here;
-    }
+#[inline(always)]
+fn count_words(words: &[u64]) -> usize {
+    words.iter().map(|word| word.count_ones() as usize).sum()
 }
 
 /// Bit `x` of `words` says whether value `x` is at least `threshold`.
@@ -289,13 +223,16 @@ pub fn last_set(words: &[u64], to: usize) -> Option<usize> {
 #[inline(always)]
 fn write_row<S: Simd>(simd: S, words: &[u64], row: &mut [u8]) {
     let (none, all) = (u8x64::splat(simd, 0), u8x64::splat(simd, u8::MAX));
-    for (word, pixels) in words.iter().zip(row.chunks_mut(WORD)) {
-        let values = mask8x64::from_bitmask(simd, *word).select(all, none);
-        if pixels.len() == WORD {
-            values.store_slice(pixels);
-        } else {
-            pixels.copy_from_slice(&values.as_slice()[..pixels.len()]);
-        }
+    let pixels = |word| mask8x64::from_bitmask(simd, word).select(all, none);
+    for (word, out) in words.iter().zip(row.as_chunks_mut::<WORD>().0) {
+        pixels(*word).store_slice(out);
+    }
+    let width = row.len();
+    if let Some(last) = row.last_chunk_mut::<WORD>() {
+        // Those that a word has too many of were written before.
+        pixels(bits_from(words, width - WORD)).store_slice(last);
+    } else if let Some(word) = words.first() {
+        row.copy_from_slice(&pixels(*word).as_slice()[..width]);
     }
 }
 

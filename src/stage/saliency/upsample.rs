@@ -96,34 +96,26 @@ impl Rows<'_> {
         }
     }
 
-    /// Sets the bits of pixels of at least `threshold`, pixel `i % 64` of word `i / 64`;
-    /// beyond the last one they mean nothing.
+    /// One bit for each pixel of the cells from `x` on that is at least `threshold`.
     #[inline(always)]
-    pub(in crate::stage) fn compare<S: Simd>(&self, simd: S, threshold: f32, words: &mut [u64]) {
-        let mut before = f32x16::splat(simd, self.value(0));
-        let mut here = self.lanes_or_last(simd, 0);
-        for (i, word) in words.iter_mut().enumerate() {
-            let after = self.lanes_or_last(simd, (i + 1) * LANES);
-            let around = [before.slide::<{ LANES - 1 }>(here), here, here.slide::<1>(after)];
-            // What is between values exceeds none of them.
-            let [left, middle, right] = around;
-            *word = 0;
-            if left.max(middle).max(right).simd_ge(threshold).any_true() {
-                for (i, pixels) in between(around).into_iter().enumerate() {
-                    *word |= pixels.simd_ge(threshold).to_bitmask() << (i * LANES);
-                }
-            }
-            (before, here) = (here, after);
-        }
-    }
-
-    /// As [`Rows::lanes`]; the last value goes on beyond the end.
-    #[inline(always)]
-    fn lanes_or_last<S: Simd>(&self, simd: S, x: usize) -> f32x16<S> {
+    fn compare<S: Simd>(&self, simd: S, x: usize, threshold: f32) -> u64 {
         let last = self.upper.len() - 1;
-        let upper: f32x16<S> = padded(simd, self.upper, x, self.upper[last]);
-        let lower: f32x16<S> = padded(simd, self.lower, x, self.lower[last]);
-        upper + (lower - upper) * self.share
+        let before = f32x16::splat(simd, self.value(x.saturating_sub(1)));
+        let after = f32x16::splat(simd, self.value((x + LANES).min(last)));
+        let here = if x + LANES <= self.upper.len() {
+            self.lanes(simd, x)
+        } else {
+            // The last value goes on beyond the end.
+            let upper: f32x16<S> = padded(simd, self.upper, x, self.upper[last]);
+            let lower: f32x16<S> = padded(simd, self.lower, x, self.lower[last]);
+            upper + (lower - upper) * self.share
+        };
+        let around = [before.slide::<{ LANES - 1 }>(here), here, here.slide::<1>(after)];
+        let mut bits = 0;
+        for (i, pixels) in between(around).into_iter().enumerate() {
+            bits |= pixels.simd_ge(threshold).to_bitmask() << (i * LANES);
+        }
+        bits
     }
 
     #[inline(always)]
@@ -131,6 +123,66 @@ impl Rows<'_> {
         let upper = f32x16::from_slice(simd, &self.upper[x..x + LANES]);
         let lower = f32x16::from_slice(simd, &self.lower[x..x + LANES]);
         upper + (lower - upper) * self.share
+    }
+}
+
+/// Sets the bits of the pixels of row `y` of cells that are at least `threshold`, pixel `i % 64`
+/// of word `i / 64` of each of four rows of pixels, or of fewer at the lower edge; beyond
+/// the last pixel of a row they mean nothing. Values are those of attention, 0..=1.
+#[inline(always)]
+pub(in crate::stage) fn compare<S: Simd>(
+    simd: S,
+    cells: &Image<f32>,
+    y: usize,
+    threshold: f32,
+    words: &mut [u64],
+) {
+    let stride = cells.width().div_ceil(LANES);
+    let near = Near {
+        rows: [y.saturating_sub(1), y, (y + 1).min(cells.height() - 1)].map(|y| cells.row(y)),
+        limits: [threshold - ROUNDING, threshold + ROUNDING],
+    };
+    // Of the cells before, at the edge none or all as those behind it.
+    let mut before = [0, u64::MAX];
+    let mut here = near.bits(simd, 0);
+    for i in 0..stride {
+        let after = if i + 1 < stride { near.bits(simd, (i + 1) * LANES) } else { [0, u64::MAX] };
+        let beside = [0, 1].map(|k| (before[k] >> (LANES - 1) & 1, after[k] & 1));
+        let some = here[0] != 0 || beside[0] != (0, 0);
+        let all = here[1] == (1 << LANES) - 1 && beside[1] == (1, 1);
+        for (row, words) in words.chunks_exact_mut(stride).enumerate() {
+            words[i] = match (some, all) {
+                (false, _) => 0,
+                (_, true) => u64::MAX,
+                _ => Rows::at(cells, y * CELL + row).compare(simd, i * LANES, threshold),
+            };
+        }
+        (before, here) = (here, after);
+    }
+}
+
+/// What is between values exceeds none of them by more.
+const ROUNDING: f32 = 1e-3;
+
+/// Rows of cells that the pixels of the middle one are between.
+struct Near<'a> {
+    rows: [&'a [f32]; 3],
+    limits: [f32; 2],
+}
+
+impl Near<'_> {
+    /// Of the cells from `x` on, which have one at least as large as the lower limit, and
+    /// which have three as the upper one; the last cell goes on beyond the end.
+    #[inline(always)]
+    fn bits<S: Simd>(&self, simd: S, x: usize) -> [u64; 2] {
+        let last = self.rows[1].len() - 1;
+        let middle: f32x16<S> = padded(simd, self.rows[1], x, self.rows[1][last]);
+        let [mut most, mut least] = [middle; 2];
+        for row in [self.rows[0], self.rows[2]] {
+            let row: f32x16<S> = padded(simd, row, x, row[last]);
+            (most, least) = (most.max(row), least.min(row));
+        }
+        [most.simd_ge(self.limits[0]).to_bitmask(), least.simd_ge(self.limits[1]).to_bitmask()]
     }
 }
 
