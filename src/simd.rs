@@ -128,3 +128,16 @@ pub(crate) fn transpose_every<S: Simd>(
     }
     rows
 }
+
+/// Transposes 16 vectors of words: four rounds, as above.
+#[inline(always)]
+pub(crate) fn transpose_words<S: Simd>(mut rows: [u32x16<S>; 16]) -> [u32x16<S>; 16] {
+    for _ in 0..4 {
+        let mut next = rows;
+        for i in 0..8 {
+            (next[2 * i], next[2 * i + 1]) = rows[i].interleave(rows[i + 8]);
+        }
+        rows = next;
+    }
+    rows
+}

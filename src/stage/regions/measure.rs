@@ -51,7 +51,8 @@ pub struct Evidence {
 pub struct Measure {
     level: Level,
     depth: Depth,
-    sample: Vec<f32>,
+    /// Bits of disparities, which are positive: they have the same order.
+    sample: Vec<u32>,
     row: Vec<f32>,
 }
 
@@ -147,7 +148,7 @@ impl Measure {
         (first, every): (usize, usize),
     ) {
         let step = (bounds.area / every).div_ceil(MOST_VALUES).max(1);
-        self.sample.resize(bounds.height().div_ceil(every) * bounds.width().div_ceil(step), 0.0);
+        self.sample.resize(bounds.height().div_ceil(every) * bounds.width().div_ceil(step), 0);
         let scale = source.rig.depth_scale() as f32;
         let mut n = 0;
         for (row, y) in (bounds.y0 + first..bounds.y1).step_by(every).enumerate() {
@@ -155,7 +156,7 @@ impl Measure {
             let from = bounds.x0 + row * SHIFT % step;
             for x in (from..bounds.x1).step_by(step) {
                 // What does not count is written over: nobody can foresee what does.
-                self.sample[n] = d[x];
+                self.sample[n] = d[x].to_bits();
                 n += usize::from((ids[x] == id) & self.depth.of(d[x], scale).is_finite());
             }
         }
@@ -248,8 +249,9 @@ fn mean_and_deviation([sum, squares]: [f64; 2], n: f64) -> (f64, f64) {
 }
 
 /// Ascending percentiles, each interpolated between its two neighbours; NaN
-/// when there is no value. Reorders the values, in linear time.
-fn percentiles<const N: usize>(values: &mut [f32], parts: [f32; N]) -> [f32; N] {
+/// when there is no value. Values are given by their bits and are positive. Reorders
+/// them, in linear time.
+fn percentiles<const N: usize>(values: &mut [u32], parts: [f32; N]) -> [f32; N] {
     let mut from = 0;
     parts.map(|part| {
         if values.is_empty() {
@@ -258,9 +260,9 @@ fn percentiles<const N: usize>(values: &mut [f32], parts: [f32; N]) -> [f32; N] 
         let rank = part * (values.len() - 1) as f32;
         let index = (rank as usize).min(values.len() - 1).max(from);
         // What lies before `from` is already no larger than the rest.
-        let (_, low, rest) = values[from..].select_nth_unstable_by(index - from, f32::total_cmp);
-        let low = *low;
-        let high = rest.iter().copied().reduce(f32::min).unwrap_or(low);
+        let (_, low, rest) = values[from..].select_nth_unstable(index - from);
+        let high = f32::from_bits(rest.iter().copied().min().unwrap_or(*low));
+        let low = f32::from_bits(*low);
         from = index;
         low + (high - low) * (rank - index as f32)
     })

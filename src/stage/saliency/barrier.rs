@@ -6,7 +6,7 @@
 //! difference of the largest and the smallest value on it.
 
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, prelude::*, u8x64, u32x16};
+use crate::simd::{Level, Simd, dispatch, prelude::*, transpose_words, u8x64, u32x16};
 
 /// Channels that are computed side by side: Y, Cb, Cr and disparity.
 const CHANNELS: usize = 4;
@@ -42,8 +42,8 @@ pub struct Barrier {
     /// the barrier.
     outside: Vec<Step>,
     first: Vec<Step>,
-    /// One row of cells.
-    row: Vec<u32>,
+    /// The cells of a band, row by row, with room before and behind each row.
+    rows: Vec<u32>,
 }
 
 /// The colour in ITU-R BT.601 YCbCr, full range.
@@ -69,7 +69,7 @@ impl Barrier {
             span: Vec::new(),
             outside: Vec::new(),
             first: Vec::new(),
-            row: Vec::new(),
+            rows: Vec::new(),
         }
     }
 
@@ -90,7 +90,7 @@ impl Barrier {
         }
         let bands = self.bands();
         dispatch!(self.level, simd => {
-            self.take(rgb, fourth);
+            self.take(simd, rgb, fourth);
             for pass in 0..PASSES {
                 for i in 0..bands {
                     match pass {
@@ -147,19 +147,39 @@ impl Barrier {
         }
     }
 
+    /// Length of a row of the buffer: whole groups of steps go beyond its cells, which
+    /// begin with number [`ROWS`].
+    fn stride(&self) -> usize {
+        self.size.width + 3 * ROWS
+    }
+
     /// Writes the values askew.
     #[inline(always)]
-    fn take(&mut self, rgb: &Image<[u8; 3]>, fourth: &Image<u8>) {
-        self.row.resize(self.size.width, 0);
-        for y in 0..self.size.height {
-            let cells = rgb.row(y).iter().zip(fourth.row(y));
-            for (value, (&rgb, &fourth)) in self.row.iter_mut().zip(cells) {
-                let [luma, cb, cr] = ycbcr(rgb);
-                *value = u32::from_le_bytes([luma, cb, cr, fourth]);
+    fn take<S: Simd>(&mut self, simd: S, rgb: &Image<[u8; 3]>, fourth: &Image<u8>) {
+        let (width, stride, steps) = (self.size.width, self.stride(), self.steps());
+        self.rows.resize(ROWS * stride, 0);
+        for (band, values) in self.value.chunks_exact_mut(steps).enumerate() {
+            // Beyond the image all is 0.
+            self.rows.fill(0);
+            let upper = band * ROWS;
+            let rows = self.rows.chunks_exact_mut(stride).zip(upper..self.size.height);
+            for (row, y) in rows {
+                let cells = rgb.row(y).iter().zip(fourth.row(y));
+                for (value, (&rgb, &fourth)) in row[ROWS..ROWS + width].iter_mut().zip(cells) {
+                    let [luma, cb, cr] = ycbcr(rgb);
+                    *value = u32::from_le_bytes([luma, cb, cr, fourth]);
+                }
             }
-            let (first, at) = self.place(0, y);
-            for (step, value) in self.value[first..].iter_mut().zip(&self.row) {
-                step[at..at + CHANNELS].copy_from_slice(&value.to_le_bytes());
+            for (i, values) in values.chunks_mut(ROWS).enumerate() {
+                let mut cells = [u32x16::splat(simd, 0); ROWS];
+                for (r, cells) in cells.iter_mut().enumerate() {
+                    let at = r * stride + (i + 1) * ROWS - r;
+                    *cells = u32x16::from_slice(simd, &self.rows[at..at + ROWS]);
+                }
+                for (value, cells) in values.iter_mut().zip(transpose_words(cells)) {
+                    let cells: u8x64<S> = cells.bitcast();
+                    cells.store_slice(value);
+                }
             }
         }
     }
@@ -169,11 +189,12 @@ impl Barrier {
     fn give(&mut self, color: &mut Image<f32>, extra: &mut Image<f32>) {
         for y in 0..self.size.height {
             let (first, at) = self.place(0, y);
-            for (value, step) in self.row.iter_mut().zip(&self.span[first..]) {
+            let row = &mut self.rows[..self.size.width];
+            for (value, step) in row.iter_mut().zip(&self.span[first..]) {
                 *value = cell(step, at);
             }
             let out = color.row_mut(y).iter_mut().zip(extra.row_mut(y));
-            for ((color, extra), value) in out.zip(&self.row) {
+            for ((color, extra), value) in out.zip(&*row) {
                 let [y, cb, cr] = [value & 0xff, value >> 8 & 0xff, value >> 16 & 0xff];
                 *color = (y + cb + cr) as f32;
                 *extra = (value >> 24) as f32;
