@@ -5,7 +5,7 @@ use crate::stage::ground::Plane;
 use crate::stage::regions::RegionSource;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
 use crate::stage::regions::components::tolerance;
-use crate::stage::regions::runs::run;
+use crate::stage::regions::runs::{Spans, edge_words, find_edges};
 use crate::stage::roi::bits::{BitMask, bits_from, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};
 
@@ -46,6 +46,8 @@ pub struct Painter {
     ids: Vec<u32>,
     surface: Vec<f32>,
     tolerance: Vec<f32>,
+    /// Where the row's ids change.
+    edges: Vec<u64>,
     /// Per pixel of a row the same, what a hole is, and the ground's change along it.
     surfaces: Vec<f32>,
     tolerances: Vec<f32>,
@@ -64,6 +66,7 @@ impl Painter {
             ids: Vec::new(),
             surface: Vec::new(),
             tolerance: Vec::new(),
+            edges: Vec::new(),
             surfaces: Vec::new(),
             tolerances: Vec::new(),
             holes: Vec::new(),
@@ -98,10 +101,12 @@ impl Painter {
             self.own[1..=row.len()].copy_from_slice(row);
             self.own_surface[1..=row.len()].copy_from_slice(things.surface.row(cy));
             self.holes.fill(OUTSIDE);
-            enclose(row, fine.row(cy), &mut self.holes);
             let surfaces = things.surface.row(if below.is_empty() { cy } else { next });
             dispatch!(self.level, simd => {
+                find_edges(simd, row, &mut self.edges);
+                enclose(row, Spans::new(&self.edges), fine.row(cy), &mut self.holes);
                 self.prepare(below, surfaces);
+                find_edges(simd, &self.ids, &mut self.edges);
                 self.paint(simd, plane, source, cy, out);
             });
         }
@@ -115,6 +120,7 @@ impl Painter {
         }
         self.own_surface.resize(width + 2, 0.0);
         self.ids.resize(width, 0);
+        self.edges.resize(edge_words(width), 0);
         self.surface.resize(width, 0.0);
         self.tolerance.resize(width, 0.0);
         // Whole groups from any pixel on.
@@ -175,9 +181,11 @@ impl Painter {
     ) {
         let size = source.disparity.size();
         let rows = cy * HIGH..((cy + 1) * HIGH).min(size.height);
-        let mut next = 0;
-        while let Some((id, cells)) = run(&self.ids, next) {
-            next = cells.end;
+        for cells in Spans::new(&self.edges) {
+            let id = self.ids[cells.start];
+            if id == 0 {
+                continue;
+            }
             let columns = cells.start * WIDE..(cells.end * WIDE).min(size.width);
             let mut painted = PixelBox::NONE;
             for x in columns.clone().step_by(LANES) {
@@ -235,22 +243,27 @@ fn write<S: Simd>(simd: S, row: &mut [u32], id: u32, bits: u64) {
     }
 }
 
-/// Fills `holes`, per pixel, for the cells of things in a row. A hole is inside
-/// of a thing where there are fine cells of the thing on both sides (or the edge
-/// of the image) before those of anything else: what only one camera sees at
-/// the sides of a thing belongs to what is behind it.
-fn enclose(ids: &[u32], fine: &[u64], holes: &mut [u8]) {
-    let mut next = 0;
-    while let Some((id, cells)) = run(ids, next) {
-        next = cells.end;
+/// Fills `holes`, per pixel, for the cells of things in a row, whose ids change between
+/// `spans`. A hole is inside of a thing where there are fine cells of the thing on both
+/// sides (or the edge of the image) before those of anything else: what only one camera
+/// sees at the sides of a thing belongs to what is behind it.
+#[inline(always)]
+fn enclose(ids: &[u32], spans: Spans<'_>, fine: &[u64], holes: &mut [u8]) {
+    for cells in spans {
+        let id = ids[cells.start];
+        if id == 0 {
+            continue;
+        }
         let own = |cell: usize| ids[cell] == id;
         let left = last_set(fine, cells.start).is_none_or(own);
         let right = first_set(fine, cells.end).is_none_or(own);
-        let first = first_set(fine, cells.start).unwrap_or(cells.end);
-        let last = last_set(fine, cells.end);
-        for cell in cells {
-            let inside = (left || cell > first) && (right || last.is_some_and(|last| cell < last));
-            holes[cell * WIDE..][..WIDE].fill(if inside { INSIDE } else { OWN });
+        let first = first_set(fine, cells.start).map_or(cells.end, |first| first + 1);
+        let last = last_set(fine, cells.end).unwrap_or(cells.start);
+        holes[cells.start * WIDE..cells.end * WIDE].fill(OWN);
+        let from = if left { cells.start } else { first.min(cells.end) };
+        let to = if right { cells.end } else { last.max(cells.start) };
+        if from < to {
+            holes[from * WIDE..to * WIDE].fill(INSIDE);
         }
     }
 }
@@ -258,6 +271,7 @@ fn enclose(ids: &[u32], fine: &[u64], holes: &mut [u8]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd;
 
     #[test]
     fn a_hole_belongs_to_a_thing_that_is_measured_on_both_sides() {
@@ -265,7 +279,9 @@ mod tests {
         let ids = [1, 1, 1, 1, 1, 1, 2, 2, 0];
         let fine = [0b1_0101_0100];
         let mut holes = [OUTSIDE; 9 * WIDE];
-        enclose(&ids, &fine, &mut holes);
+        let mut edges = vec![0; edge_words(ids.len())];
+        dispatch!(simd::detect(), simd => find_edges(simd, &ids, &mut edges));
+        enclose(&ids, Spans::new(&edges), &fine, &mut holes);
         let expected = [INSIDE, INSIDE, INSIDE, INSIDE, OWN, OWN, OWN, OWN, OUTSIDE];
         assert_eq!(holes.as_chunks::<WIDE>().0, expected.map(|hole| [hole; WIDE]));
     }
