@@ -162,10 +162,11 @@ impl Upright {
 /// `width` pixels; the last column may have none, and its left one tells.
 #[inline(always)]
 fn right_pixels(pixels: &[u64], width: usize, cells: Range<usize>, bits: &mut [u64]) {
-    for index in cells.start / 64..cells.end.div_ceil(64) {
+    let words = cells.start / 64..cells.end.div_ceil(64);
+    for (index, word) in words.clone().zip(&mut bits[words]) {
         let [low, high] =
             [0, 64].map(|at| even_bits(bits_from(pixels, index * WIDE * 64 + at) >> 1));
-        bits[index] = low | high << 32;
+        *word = low | high << 32;
     }
     if !width.is_multiple_of(WIDE) {
         let cell = width / WIDE;

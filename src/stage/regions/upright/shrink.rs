@@ -82,7 +82,7 @@ impl Row<'_> {
 #[inline(always)]
 fn cells_of(upper: &[u64], lower: &[u64], x: usize) -> u64 {
     let any = bits_from(upper, x) | bits_from(lower, x);
-    even_bits(any | any >> 1) & (1 << LANES) - 1
+    even_bits(any | any >> 1) & ((1 << LANES) - 1)
 }
 
 /// Median disparity of some of the pixels of each of several cells, whose rows
