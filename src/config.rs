@@ -234,7 +234,7 @@ group!(
         min_disparity: i64 = 0,
         disparity_range: i64 = 192,
         p1: i64 = 8,
-        p2: i64 = 80,
+        p2: i64 = 96,
         uniqueness_ratio: i64 = 16,
         disp12_max_diff: i64 = 2,
         speckle_size: i64 = 150,

@@ -55,7 +55,7 @@ impl Coarse {
         let lo = stereo.min_disparity.max(0) as usize;
         let hi = lo + stereo.disparity_range.max(1) as usize;
         let settings = Settings {
-            penalties: Penalties::of(stereo),
+            penalties: Penalties::of(stereo).shrunk(),
             method: Method::FourPaths,
             context: 4,
             search: lo / CELL..hi.div_ceil(CELL) + 1,

@@ -11,7 +11,7 @@ use salient_stereo::simd::{self, Level};
 use salient_stereo::stage::coarse::{CELL, Coarse, CoarseDisparity, shrink};
 use salient_stereo::stage::refine::Refine;
 use salient_stereo::stage::stereo::block::Measure;
-use salient_stereo::stage::stereo::cost::Penalties;
+use salient_stereo::stage::stereo::cost::{Edges, Penalties};
 use salient_stereo::stage::stereo::engine::{Engine, Method, Settings, Views};
 use salient_stereo::stage::stereo::plan::{LEAST, Plan};
 use salient_stereo::stage::stereo::{Matches, NO_MATCH, Stereo};
@@ -47,7 +47,12 @@ fn coarse_of(size: Size, seed: u64) -> Image<f32> {
 }
 
 fn settings(method: Method, search: Range<usize>) -> Settings {
-    Settings { penalties: Penalties { p1: 7, p2: 40 }, method, context: 3, search }
+    Settings {
+        penalties: Penalties { p1: 7, p2: 40, edges: Edges::Sharp },
+        method,
+        context: 3,
+        search,
+    }
 }
 
 fn assert_same(found: &Matches, expected: &Matches, what: &str) {
@@ -150,6 +155,7 @@ proptest! {
         rarity in 1_u64..400,
         p1 in 0_u8..=100,
         more in 0_u8..=100,
+        blurred: bool,
         context in 0_usize..10,
     ) {
         let size = Size::new(width, height);
@@ -157,8 +163,9 @@ proptest! {
         let coarse = coarse_of(size, seed ^ 1);
         let mut noise = Noise(seed ^ 2);
         let mask = Image::from_fn(size, |_, _| if noise.next().is_multiple_of(rarity) { 255 } else { 0 });
+        let edges = if blurred { Edges::Blurred } else { Edges::Sharp };
         let settings = Settings {
-            penalties: Penalties { p1, p2: p1.saturating_add(more).min(100) },
+            penalties: Penalties { p1, p2: p1.saturating_add(more).min(100), edges },
             context,
             ..settings(Method::EightPaths, 0..24)
         };

@@ -46,6 +46,18 @@ pub struct Penalties {
     pub p1: u8,
     /// For a larger step between pixels of equal brightness.
     pub p2: u8,
+    /// What an edge takes off P2.
+    pub edges: Edges,
+}
+
+/// How much the edges of an image say about jumps of disparity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Edges {
+    /// Those of a view: P2 falls by 2 |dI|, down to a tenth of the way from P1 to P2.
+    Sharp,
+    /// Those of a shrunk view, where texture makes steps as large: P2 falls by |dI|,
+    /// down to a quarter of the way.
+    Blurred,
 }
 
 impl Penalties {
@@ -53,12 +65,23 @@ impl Penalties {
     pub fn of(stereo: &config::Stereo) -> Self {
         let most = i64::from(MAX_PENALTY);
         let p1 = stereo.p1.clamp(0, most);
-        Self { p1: p1 as u8, p2: stereo.p2.clamp(p1, most) as u8 }
+        Self { p1: p1 as u8, p2: stereo.p2.clamp(p1, most) as u8, edges: Edges::Sharp }
     }
 
-    /// P2 is never less than this, however strong the edge: a quarter of the way from P1 to P2.
+    /// The same for shrunk views: P2 is five sixths of that of the views, but not below P1.
+    #[must_use]
+    pub fn shrunk(self) -> Self {
+        let p2 = u16::from(self.p2) * 5 / 6;
+        Self { p2: (p2 as u8).max(self.p1), edges: Edges::Blurred, ..self }
+    }
+
+    /// P2 is never less than this, however strong the edge.
     pub const fn least_p2(self) -> u8 {
-        self.p1 + (self.p2 - self.p1) / 4
+        let parts = match self.edges {
+            Edges::Sharp => 10,
+            Edges::Blurred => 4,
+        };
+        self.p1 + (self.p2 - self.p1) / parts
     }
 }
 
@@ -71,6 +94,8 @@ pub struct PenaltyLanes<S: Simd> {
     pub p2: u8x32<S>,
     /// The least P2.
     pub least: u8x32<S>,
+    /// The bits of |dI| that count twice: all or none.
+    twice: u8x32<S>,
 }
 
 impl<S: Simd> PenaltyLanes<S> {
@@ -83,13 +108,14 @@ impl<S: Simd> PenaltyLanes<S> {
             p1: scaled(simd, penalties.p1, reciprocals),
             p2: scaled(simd, penalties.p2, reciprocals),
             least: scaled(simd, penalties.least_p2(), reciprocals),
+            twice: u8x32::splat(simd, if penalties.edges == Edges::Sharp { 255 } else { 0 }),
         }
     }
 
     /// P2 across a brightness step |dI|: lower where an edge makes a jump likely.
     #[inline(always)]
     pub fn p2_across(&self, step: u8x32<S>) -> u8x32<S> {
-        self.p2.saturating_sub(step).max(self.least)
+        self.p2.saturating_sub(step).saturating_sub(step & self.twice).max(self.least)
     }
 }
 

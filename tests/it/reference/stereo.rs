@@ -7,7 +7,7 @@ use salient_stereo::config::{Config, Fill};
 use salient_stereo::image::{Image, Size};
 use salient_stereo::stage::coarse::CELL;
 use salient_stereo::stage::stereo::block::{Measure, RADIUS};
-use salient_stereo::stage::stereo::cost::MAX_COST;
+use salient_stereo::stage::stereo::cost::{Edges, MAX_COST};
 use salient_stereo::stage::stereo::engine::{Method, Settings, Views};
 use salient_stereo::stage::stereo::plan::{Band, Plan, Run};
 use salient_stereo::stage::stereo::{Matches, NO_MATCH};
@@ -110,7 +110,8 @@ impl<'a> Domain<'a> {
         let q = self.views.weight.map_or(255, |weight| u16::from(weight.get_clamped(x, y)));
         let scaled = |p: u8| ((u16::from(p) * q + 127) / 255) as u8;
         let penalties = self.settings.penalties;
-        let least = penalties.p1 + (penalties.p2 - penalties.p1) / 4;
+        let parts = if penalties.edges == Edges::Sharp { 10 } else { 4 };
+        let least = penalties.p1 + (penalties.p2 - penalties.p1) / parts;
         (scaled(penalties.p1), scaled(penalties.p2), scaled(least))
     }
 
@@ -133,7 +134,8 @@ impl<'a> Domain<'a> {
     fn step(&self, p: Point, edge: Point, q: &State) -> State {
         let (p1, p2, least) = self.penalties(p);
         let step = self.gray(p).abs_diff(self.gray(edge));
-        let p2 = p2.saturating_sub(step).max(least);
+        let times = if self.settings.penalties.edges == Edges::Sharp { 2 } else { 1 };
+        let p2 = p2.saturating_sub(step.saturating_mul(times)).max(least);
         let before = |d: Option<usize>| {
             let cost = d.and_then(|d| q.costs.get(&d)).copied().unwrap_or(255);
             cost.saturating_sub(q.floor).min(p2)
