@@ -101,8 +101,8 @@ impl Scene {
     fn refine(&mut self) -> impl FnMut() + '_ {
         let mut stage = Refine::new(&self.config, SIZE);
         let mut run = move || {
-            let Perception { rig, disparity, confidence, .. } = &mut self.perception;
-            stage.run(&self.matches, &self.roi, rig, disparity, confidence);
+            let Perception { left, rig, disparity, confidence, .. } = &mut self.perception;
+            stage.run(&self.matches, &left.gray, &self.roi, rig, disparity, confidence);
         };
         run();
         run

@@ -160,7 +160,14 @@ impl Pipeline {
         );
         lap.mark(&mut out.times, Stage::Stereo);
 
-        self.refine.run(&self.matches, &out.roi, &out.rig, &mut out.disparity, &mut out.confidence);
+        self.refine.run(
+            &self.matches,
+            &out.left.gray,
+            &out.roi,
+            &out.rig,
+            &mut out.disparity,
+            &mut out.confidence,
+        );
         lap.mark(&mut out.times, Stage::Refine);
 
         self.depth.run(&out.disparity, &out.rig, &mut out.depth);

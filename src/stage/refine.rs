@@ -1,5 +1,6 @@
 //! From raw matches to disparity and confidence.
 
+pub mod guided;
 pub mod median;
 pub mod speckle;
 pub mod trust;
@@ -30,7 +31,7 @@ const ROWS_AT_ONCE: usize = 32;
 /// Pixels whose partners are looked up at a time.
 const BLOCK: usize = 64;
 
-/// Left-right check, median, speckle filter, confidence, fill.
+/// Left-right check, median, confidence, speckle filter, guided median, fill.
 pub struct Refine {
     level: Level,
     size: Size,
@@ -43,6 +44,8 @@ pub struct Refine {
     /// Evidence of what passed the check, else 0.
     evidence: Image<u8>,
     smooth: Image<i16>,
+    /// `smooth` without speckles, filtered along its rows.
+    across: Image<i16>,
     /// A row without any match.
     outside: Vec<i16>,
     speckles: Speckles,
@@ -74,6 +77,7 @@ impl Refine {
             checked: Image::default(),
             evidence: Image::default(),
             smooth: Image::default(),
+            across: Image::default(),
             outside: Vec::new(),
             speckles: Speckles::default(),
             trust: Trust::new(stereo.uniqueness_ratio),
@@ -81,10 +85,11 @@ impl Refine {
     }
 
     /// Disparity in pixels with `cx_l - cx_r` subtracted (NaN where there is
-    /// none), and its confidence 0..=1.
+    /// none), and its confidence 0..=1. `gray` is the left view.
     pub fn run(
         &mut self,
         matches: &Matches,
+        gray: &Image<u8>,
         roi: &RoiMask,
         rig: &StereoRig,
         disparity: &mut Image<f32>,
@@ -95,6 +100,7 @@ impl Refine {
         self.checked.resize(self.size);
         self.evidence.resize(self.size);
         self.smooth.resize(self.size);
+        self.across.resize(self.size);
         let (level, width) = (self.level, self.size.width.max(1));
         let area = Area::of(&roi.matched);
         // Rows are independent of each other in all but the joining of patches.
@@ -130,7 +136,19 @@ impl Refine {
             });
         });
         self.speckles.find(level, &self.smooth, &area, self.speckle_size, self.speckle_range);
-        let (speckles, offset, fills) = (&self.speckles, rig.disparity_offset() as f32, self.fill);
+        let speckles = &self.speckles;
+        let smooth = self.smooth.pixels_mut()[within.clone()].par_chunks_exact_mut(width);
+        let across = self.across.pixels_mut()[within].par_chunks_exact_mut(width);
+        smooth.zip(across).enumerate().with_min_len(ROWS_AT_ONCE).for_each(
+            |(i, (smooth, across))| {
+                let y = first + i;
+                let smooth = &mut smooth[columns.clone()];
+                speckles.erase(y, smooth);
+                let (gray, across) = (&gray.row(y)[columns.clone()], &mut across[columns.clone()]);
+                dispatch!(level, simd => guided::across(simd, smooth, gray, across));
+            },
+        );
+        let (across, offset, fills) = (&self.across, rig.disparity_offset() as f32, self.fill);
         let smooth = self.smooth.pixels_mut().par_chunks_exact_mut(width);
         let disparity = disparity.pixels_mut().par_chunks_exact_mut(width);
         let confidence = confidence.pixels_mut().par_chunks_exact_mut(width);
@@ -145,8 +163,10 @@ impl Refine {
                 let smooth = &mut smooth[columns.clone()];
                 let disparity = &mut disparity[columns.clone()];
                 let confidence = &mut confidence[columns.clone()];
-                speckles.erase(y, smooth);
-                dispatch!(level, _ => measure(smooth, offset, disparity, confidence));
+                dispatch!(level, simd => {
+                    guide(simd, across, gray, outside, &area, y, smooth);
+                    measure(smooth, offset, disparity, confidence);
+                });
                 if fills {
                     fill(&roi.matched.row(y)[columns.clone()], disparity, confidence);
                 }
@@ -225,6 +245,23 @@ fn median<S: Simd>(
         &below[columns.clone()],
         smooth,
     );
+}
+
+/// The guided median along the columns: nothing is known beyond the area.
+#[inline(always)]
+fn guide<S: Simd>(
+    simd: S,
+    across: &Image<i16>,
+    gray: &Image<u8>,
+    outside: &[i16],
+    area: &Area,
+    y: usize,
+    out: &mut [i16],
+) {
+    let rows = guided::TAPS.map(|k| y.checked_add_signed(k).filter(|y| area.rows.contains(y)));
+    let disparity = rows.map(|row| &row.map_or(outside, |y| across.row(y))[area.columns.clone()]);
+    let gray = rows.map(|row| &gray.row(row.unwrap_or(y))[area.columns.clone()]);
+    guided::down(simd, disparity, gray, out);
 }
 
 /// Drops disparities that the right view contradicts, and their evidence.

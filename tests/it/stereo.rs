@@ -252,7 +252,7 @@ proptest! {
             engine.run(&views, &plan, &mut matches);
             let roi = RoiMask { salient: mask.clone(), matched: mask.clone(), fraction: 0.1 };
             let (mut disparity, mut confidence) = (Image::default(), Image::default());
-            refine.run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
+            refine.run(&matches, &left, &roi, &rig(size), &mut disparity, &mut confidence);
             let disparity: Vec<_> = disparity.pixels().iter().map(|d| d.to_bits()).collect();
             (matches, disparity, confidence)
         };
@@ -293,6 +293,8 @@ proptest! {
                 *d = NO_MATCH;
             }
         }
+        // Flat, with steps of all sizes.
+        let gray = Image::from_fn(size, |_, _| 100 + [0, 3, 20, 80][noise.next() as usize % 4]);
         let mut config = Config::default();
         config.stereo.speckle_size = speckle_size;
         config.stereo.disp12_max_diff = max_difference;
@@ -302,12 +304,12 @@ proptest! {
         } else {
             config.min_confidence = 0.9;
         }
-        let (expected, trusted) = plain::refined(&matches, &matched, &config);
+        let (expected, trusted) = plain::refined(&matches, &gray, &matched, &config);
         for level in simd::available() {
             let mut refine = Refine::with_level(&config, size, level);
             let roi = RoiMask { salient: matched.clone(), matched: matched.clone(), fraction: 0.5 };
             let (mut disparity, mut confidence) = (Image::default(), Image::default());
-            refine.run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
+            refine.run(&matches, &gray, &roi, &rig(size), &mut disparity, &mut confidence);
             prop_assert_eq!(confidence.pixels(), trusted.pixels());
             for (d, e) in disparity.pixels().iter().zip(expected.pixels()) {
                 // The rig's principal points are 2 px apart.
@@ -402,7 +404,14 @@ fn a_plane_before_a_background_is_found_to_a_fraction_of_a_pixel() {
             &mut matches,
         );
         let (mut disparity, mut confidence) = (Image::default(), Image::default());
-        Refine::new(&config, size).run(&matches, &roi, &rig(size), &mut disparity, &mut confidence);
+        Refine::new(&config, size).run(
+            &matches,
+            &left.gray,
+            &roi,
+            &rig(size),
+            &mut disparity,
+            &mut confidence,
+        );
         let (mut valid, mut wrong) = (0, 0);
         for y in 8..size.height - 8 {
             for x in 60..size.width - 8 {

@@ -346,10 +346,11 @@ fn winner(
     Some((32 * best as i16 + offset as i16, evidence))
 }
 
-/// Left-right check, median, speckle filter, confidence and fill: disparity in
-/// px, NaN where none, and its confidence.
+/// Left-right check, median, speckle filter, confidence, guided median and fill:
+/// disparity in px, NaN where none, and its confidence.
 pub fn refined(
     matches: &Matches,
+    gray: &Image<u8>,
     matched: &Image<u8>,
     config: &Config,
 ) -> (Image<f32>, Image<f32>) {
@@ -415,7 +416,9 @@ pub fn refined(
     let patches = patches(&trusted, (config.stereo.speckle_range * 32.0) as i32);
     let least = config.stereo.speckle_size as usize;
     let valid = |x: usize, y: usize| trusted.get(x, y) != NO_MATCH && patches.get(x, y) >= least;
-    let measured = |x, y| f32::from(smooth.get(x, y)) / 32.0;
+    let kept = Image::from_fn(size, |x, y| if valid(x, y) { smooth.get(x, y) } else { NO_MATCH });
+    let guided = weighted_median(&weighted_median(&kept, gray, (1, 0)), gray, (0, 1));
+    let measured = |x, y| f32::from(guided.get(x, y)) / 32.0;
     let mut disparity = Image::filled(size, f32::NAN);
     let mut confidence = Image::new(size);
     for y in 0..size.height {
@@ -475,4 +478,27 @@ fn patches(image: &Image<i16>, range: i32) -> Image<usize> {
         }
     }
     out
+}
+
+/// The weighted median of five pixels along an axis: each disparity stands as often
+/// in a list as its pixel weighs, and of that list the (lower) median is taken.
+fn weighted_median(disparity: &Image<i16>, gray: &Image<u8>, axis: (isize, isize)) -> Image<i16> {
+    let size = disparity.size();
+    Image::from_fn(size, |x, y| {
+        if disparity.get(x, y) == NO_MATCH {
+            return NO_MATCH;
+        }
+        let mut list = Vec::new();
+        for k in [-4, -2, 0, 2, 4] {
+            let u = x.checked_add_signed(k * axis.0).filter(|&u| u < size.width);
+            let v = y.checked_add_signed(k * axis.1).filter(|&v| v < size.height);
+            let (Some(u), Some(v)) = (u, v) else { continue };
+            let difference = gray.get(u, v).abs_diff(gray.get(x, y)).min(32);
+            if disparity.get(u, v) != NO_MATCH {
+                list.extend(vec![disparity.get(u, v); 32 - usize::from(difference)]);
+            }
+        }
+        list.sort_unstable();
+        list[(list.len() - 1) / 2]
+    })
 }
