@@ -23,7 +23,7 @@ const MOST_PART: usize = 3;
 /// are upright.
 const BAND: usize = 3;
 /// What an edge loses per pixel further inward.
-const INWARD: f32 = 0.95;
+const INWARD: f32 = 0.8;
 /// Pixels beyond the end of a row where what is beside the thing is looked for.
 const ASIDE: usize = 2;
 /// How much nearer that must be to hide a part of the thing, in parts of the disparity.

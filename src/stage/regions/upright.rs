@@ -21,7 +21,7 @@ use post::{Posts, Stump};
 use shrink::shrink;
 
 /// Share of a thing's cells that must be salient.
-const LEAST_SALIENT: f32 = 0.3;
+const LEAST_SALIENT: f32 = 0.4;
 /// The former of such regions, with its buffers.
 #[derive(Debug)]
 pub struct Upright {

@@ -27,7 +27,7 @@ const STEP_PX: f32 = 0.2;
 /// car's side seen from before it. Near the axis the formula knows no limit.
 const LONGEST_M: f32 = 2.0;
 /// Height of a segment that alone is evidence of a thing, metres.
-const STRONG_M: f32 = 0.4;
+const STRONG_M: f32 = 0.36;
 /// Share of a part's columns that must stand on another part of the same thing.
 const LEAST_LINK: f32 = 0.5;
 /// How much lower than the top of the part in front an upper part may begin, metres.
