@@ -43,6 +43,7 @@ mod it {
     mod roi;
     mod saliency;
     mod scene;
+    mod standing;
     mod stereo;
     mod sync;
     #[cfg(feature = "tool")]
