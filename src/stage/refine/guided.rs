@@ -52,9 +52,13 @@ pub fn across<S: Simd>(simd: S, disparity: &[i16], gray: &[u8], out: &mut [i16])
     for x in inner.clone().step_by(LANES) {
         // The last ones overlap those before.
         let x = x.min(inner.end - LANES);
-        let spans = TAPS.map(|k| x.wrapping_add_signed(k)).map(|x| x..x + LANES);
-        let disparity = spans.clone().map(|span| &disparity[span]);
-        medians(simd, disparity, spans.map(|span| &gray[span]), &mut out[x..x + LANES]);
+        let (mut d, mut g) = ([&[][..]; TAPS.len()], [&[][..]; TAPS.len()]);
+        for (i, k) in TAPS.into_iter().enumerate() {
+            let from = x.wrapping_add_signed(k);
+            d[i] = &disparity[from..from + LANES];
+            g[i] = &gray[from..from + LANES];
+        }
+        medians(simd, &d, &g, &mut out[x..x + LANES]);
     }
 }
 
@@ -76,44 +80,57 @@ pub fn down<S: Simd>(simd: S, disparity: Taps<&[i16]>, gray: Taps<&[u8]>, out: &
     }
     for x in (0..width).step_by(LANES) {
         // The last ones overlap those before.
-        let span = x.min(width - LANES)..(x + LANES).min(width);
-        let disparity = disparity.map(|row| &row[span.clone()]);
-        medians(simd, disparity, gray.map(|row| &row[span.clone()]), &mut out[span.clone()]);
+        let x = x.min(width - LANES);
+        let (mut d, mut g) = ([&[][..]; TAPS.len()], [&[][..]; TAPS.len()]);
+        for i in 0..TAPS.len() {
+            d[i] = &disparity[i][x..x + LANES];
+            g[i] = &gray[i][x..x + LANES];
+        }
+        medians(simd, &d, &g, &mut out[x..x + LANES]);
     }
 }
 
-/// The medians of one block.
+/// The medians of one block. (Loops, as what arrays are mapped with is called, not
+/// inlined, and is then compiled without the wide instructions.)
 #[inline(always)]
-fn medians<S: Simd>(simd: S, disparity: Taps<&[i16]>, gray: Taps<&[u8]>, out: &mut [i16]) {
+fn medians<S: Simd>(simd: S, disparity: &Taps<&[i16]>, gray: &Taps<&[u8]>, out: &mut [i16]) {
     let none = i16x16::splat(simd, NO_MATCH);
-    let is_hole = |d: &[i16]| i16x16::from_slice(simd, d).simd_eq(none).all_true();
     let (first, second) = disparity[CENTRE].split_at(HALF);
-    if is_hole(first) && is_hole(second) {
+    let holes = i16x16::from_slice(simd, first).simd_eq(none);
+    if holes.all_true() && i16x16::from_slice(simd, second).simd_eq(none).all_true() {
         out.fill(NO_MATCH);
         return;
     }
     let centre = load(simd, gray[CENTRE], 0);
     let unlike = u8x32::splat(simd, UNLIKE);
-    let weights = gray.map(|gray| unlike.saturating_sub(abs_diff(load(simd, gray, 0), centre)));
-    let weights = weights.map(SimdWiden::widen);
-    for (at, weights) in [(0, weights.map(|w| w.0)), (HALF, weights.map(|w| w.1))] {
-        let d = disparity.map(|d| i16x16::from_slice(simd, &d[at..at + HALF]));
-        median_lanes(simd, d, weights).store_slice(&mut out[at..at + HALF]);
+    let nothing = u16x16::splat(simd, 0);
+    let mut weights = [[nothing; TAPS.len()]; 2];
+    let mut d = [[none; TAPS.len()]; 2];
+    for i in 0..TAPS.len() {
+        let weight = unlike.saturating_sub(abs_diff(load(simd, gray[i], 0), centre));
+        let (first, second) = weight.widen();
+        for (half, weight) in [first, second].into_iter().enumerate() {
+            let disparity = &disparity[i][half * HALF..(half + 1) * HALF];
+            d[half][i] = i16x16::from_slice(simd, disparity);
+            weights[half][i] = d[half][i].simd_eq(none).select(nothing, weight);
+        }
+    }
+    for half in 0..2 {
+        let medians = median_lanes(simd, &d[half], &weights[half]);
+        medians.store_slice(&mut out[half * HALF..(half + 1) * HALF]);
     }
 }
 
-/// The least disparity of those that weigh half of all together with what is below them.
+/// The least disparity of those that weigh half of all together with what is below
+/// them; holes weigh nothing.
 #[inline(always)]
-fn median_lanes<S: Simd>(simd: S, d: Taps<i16x16<S>>, weights: Taps<u16x16<S>>) -> i16x16<S> {
-    let (nothing, none) = (u16x16::splat(simd, 0), i16x16::splat(simd, NO_MATCH));
-    let mut weights = weights;
-    for (weight, d) in weights.iter_mut().zip(&d) {
-        *weight = d.simd_eq(none).select(nothing, *weight);
-    }
-    let total = weights.iter().fold(nothing, |sum, &weight| sum + weight);
+fn median_lanes<S: Simd>(simd: S, d: &Taps<i16x16<S>>, weights: &Taps<u16x16<S>>) -> i16x16<S> {
+    let nothing = u16x16::splat(simd, 0);
+    let mut total = nothing;
     // Of two equal ones the earlier counts what the later weighs.
-    let mut below = weights;
+    let mut below = *weights;
     for i in 0..TAPS.len() {
+        total += weights[i];
         for j in i + 1..TAPS.len() {
             let lower: mask16x16<S> = d[j].simd_le(d[i]);
             below[i] += lower.select(weights[j], nothing);
@@ -121,10 +138,11 @@ fn median_lanes<S: Simd>(simd: S, d: Taps<i16x16<S>>, weights: Taps<u16x16<S>>) 
         }
     }
     let most = i16x16::splat(simd, i16::MAX);
-    let least = d
-        .iter()
-        .zip(below)
-        .fold(most, |least, (&d, below)| least.min((below + below).simd_ge(total).select(d, most)));
+    let mut least = most;
+    for i in 0..TAPS.len() {
+        least = least.min((below[i] + below[i]).simd_ge(total).select(d[i], most));
+    }
+    let none = i16x16::splat(simd, NO_MATCH);
     d[CENTRE].simd_eq(none).select(none, least)
 }
 
