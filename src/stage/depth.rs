@@ -3,7 +3,7 @@
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::Image;
-use crate::simd::{Simd, f32x16, prelude::*};
+use crate::simd::{self, Level, Simd, dispatch, f32x16, prelude::*};
 
 /// ε of eq. 2 in pixels. It keeps the division defined and is far below the
 /// finest disparity step (1/32 px): at d = 1 px it moves Z by one millionth.
@@ -12,6 +12,7 @@ pub const EPSILON_PX: f32 = 1e-6;
 /// Z = f B / (d + ε), clipped as REP 117 wants it.
 #[derive(Clone, Copy, Debug)]
 pub struct Depth {
+    level: Level,
     min_m: f32,
     max_m: f32,
 }
@@ -19,7 +20,8 @@ pub struct Depth {
 impl Depth {
     /// The stage with `depth.min` and `depth.max`.
     pub fn new(config: &Config) -> Self {
-        Self { min_m: config.depth.min as f32, max_m: config.depth.max as f32 }
+        let (min_m, max_m) = (config.depth.min as f32, config.depth.max as f32);
+        Self { level: simd::detect(), min_m, max_m }
     }
 
     /// Depth in metres; NaN, +Inf, -Inf as in [`crate::perception::Perception::depth`].
@@ -30,8 +32,22 @@ impl Depth {
         let scale = rig.depth_scale() as f32;
         let limits = *self;
         depth.resize(disparity.size());
-        for (z, &d) in depth.pixels_mut().iter_mut().zip(disparity.pixels()) {
-            *z = limits.of(d, scale);
+        let level = self.level;
+        dispatch!(level, simd => {
+            limits.pixels(simd, disparity.pixels(), scale, depth.pixels_mut());
+        });
+    }
+
+    #[inline(always)]
+    fn pixels<S: Simd>(&self, simd: S, disparity: &[f32], scale_px_m: f32, depth: &mut [f32]) {
+        let (groups, rest) = disparity.as_chunks::<16>();
+        let (outs, out_rest) = depth.as_chunks_mut::<16>();
+        for (d, out) in groups.iter().zip(outs) {
+            let d = f32x16::load_array_ref(simd, d);
+            self.of_lanes(simd, d, scale_px_m).store_array(out);
+        }
+        for (&d, out) in rest.iter().zip(out_rest) {
+            *out = self.of(d, scale_px_m);
         }
     }
 

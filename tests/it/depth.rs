@@ -40,3 +40,17 @@ fn limits_and_holes_are_told_apart() {
     assert_eq!(z[5], f32::NEG_INFINITY);
     assert!(z[6].is_finite() && z[7].is_finite());
 }
+
+#[test]
+fn pixels_in_a_vector_and_behind_it_have_the_same_depth() {
+    let values = [f32::NAN, 4.3, 0.0, -1.0, 3600.0, 4.4, 3499.0, 17.25, 350.0];
+    // One and a half vectors of each, and a row that no vector fits into.
+    for value in values {
+        let many = depth_of(&[value; 24]);
+        let one = depth_of(&[value])[0];
+        assert!(
+            many.iter().all(|z| *z == one || (z.is_nan() && one.is_nan())),
+            "{value}: {many:?}"
+        );
+    }
+}

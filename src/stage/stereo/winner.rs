@@ -98,9 +98,12 @@ impl RightWinner {
         outside[..inside].fill(0);
         let outside = load_block(simd, &outside);
         let at = (lo - self.first) * self.sums_stride + (k + 1) * LANES;
-        let rows = self.sums[at..].chunks_mut(self.sums_stride);
-        for (row, cost) in rows.zip(costs) {
-            store(row, 0, load_block(simd, cost) | outside);
+        let mut rows = self.sums[at..].chunks_mut(self.sums_stride);
+        for cost in costs {
+            // (Zipped, the two would be called for, not inlined.)
+            if let Some(row) = rows.next() {
+                store(row, 0, load_block(simd, cost) | outside);
+            }
         }
     }
 
@@ -121,8 +124,9 @@ impl RightWinner {
             let mut index = load(simd, &self.index, at);
             let start =
                 (disparities.start - first) * stride + x + disparities.start + LANES - self.x0;
-            let sums = self.sums[start..].chunks(stride + 1);
-            for (d, sums) in disparities.clone().zip(sums) {
+            let mut sums = self.sums[start..].chunks(stride + 1);
+            for d in disparities.clone() {
+                let Some(sums) = sums.next() else { break };
                 let cost = load(simd, sums, 0);
                 let mine = u8x32::splat(simd, ((d - self.lo) >> self.shift) as u8);
                 index = cost.simd_lt(best).select(mine, index);
