@@ -128,3 +128,20 @@ fn scaled<S: Simd>(simd: S, penalty: u8, reciprocals: Option<&Block>) -> u8x32<S
     }
     load_block(simd, &out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn penalties_stay_in_order_whatever_is_configured() {
+        for (p1, p2, expected) in [(8, 96, [8, 96, 16]), (100, 100, [100; 3]), (40, 7, [40; 3])] {
+            let penalties = Penalties::of(&config::Stereo { p1, p2, ..Default::default() });
+            let [least, shrunk] = [penalties.least_p2(), penalties.shrunk().p2];
+            assert_eq!([penalties.p1, penalties.p2, least], expected);
+            assert_eq!(shrunk, (expected[1] as u16 * 5 / 6).max(expected[0] as u16) as u8);
+        }
+        let shrunk = Penalties::of(&config::Stereo::default()).shrunk();
+        assert_eq!([shrunk.p1, shrunk.p2, shrunk.least_p2()], [8, 80, 26]);
+    }
+}

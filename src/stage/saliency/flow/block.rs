@@ -19,8 +19,11 @@ const FIRM_RISE: f32 = 4.0;
 /// the view.
 #[derive(Clone, Copy, Debug)]
 pub struct Around {
+    /// The place: how far the block has moved, columns and rows.
     pub shift: [i32; 2],
+    /// The sum there.
     pub here: u32,
+    /// The sums one pixel before and behind, along the columns' axis and the rows'.
     pub beside: [[u32; 2]; 2],
 }
 
@@ -64,7 +67,7 @@ impl Around {
         out
     }
 
-    /// See [`Flow::sharpen`].
+    /// See [`Flow::sharpen`](super::Flow::sharpen).
     #[inline(always)]
     pub fn sharpened(&self) -> BlockShift {
         let mut out = BlockShift { shift: self.shift.map(|shift| shift as f32), firmness: 0.0 };
@@ -151,6 +154,7 @@ pub struct Windows {
 }
 
 impl Windows {
+    /// Takes the windows of `view` in.
     pub fn take(&mut self, view: &Image<u8>) {
         let columns = (view.width() + 1).saturating_sub(BLOCK);
         self.height = view.height();
