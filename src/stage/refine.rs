@@ -15,9 +15,10 @@ use crate::image::{Image, Size};
 use crate::perception::{DISPARITY_STEP, RoiMask};
 use crate::simd::{self, Level, Simd, dispatch};
 use crate::stage::coarse::fill_row;
+use crate::stage::per_thread::PerThread;
 use crate::stage::refine::median::median_row;
 use crate::stage::refine::speckle::Speckles;
-use crate::stage::refine::trust::Trust;
+use crate::stage::refine::trust::{Sums, Trust};
 use crate::stage::stereo::winner::STEPS;
 use crate::stage::stereo::{Matches, NO_MATCH};
 
@@ -50,6 +51,7 @@ pub struct Refine {
     outside: Vec<i16>,
     speckles: Speckles,
     trust: Trust,
+    sums: PerThread<Sums>,
 }
 
 impl Refine {
@@ -81,6 +83,7 @@ impl Refine {
             outside: Vec::new(),
             speckles: Speckles::default(),
             trust: Trust::new(stereo.uniqueness_ratio),
+            sums: PerThread::new(),
         }
     }
 
@@ -118,22 +121,31 @@ impl Refine {
         let (checked, evidence) = (&self.checked, &self.evidence);
         let (outside, trust, least) = (&self.outside[..], &self.trust, self.min_confidence);
         let (smooth, columns) = (&mut self.smooth, &area.columns);
-        let rows = smooth.pixels_mut().par_chunks_exact_mut(width);
-        let rows = rows.zip(confidence.pixels_mut().par_chunks_exact_mut(width)).enumerate();
-        rows.with_min_len(ROWS_AT_ONCE).for_each(|(y, (smooth, confidence))| {
-            if !area.rows.contains(&y) {
-                confidence.fill(0.0);
-                return;
+        self.sums.fit(Sums::default);
+        let sums = &self.sums;
+        // The sums over the windows of one row come from those of the row above.
+        let bands = smooth.pixels_mut().par_chunks_mut(width * ROWS_AT_ONCE);
+        let bands = bands.zip(confidence.pixels_mut().par_chunks_mut(width * ROWS_AT_ONCE));
+        bands.enumerate().for_each(|(band, (smooth, confidence))| {
+            let mut sums = sums.lock();
+            sums.clear(columns.len());
+            let rows = smooth.chunks_exact_mut(width).zip(confidence.chunks_exact_mut(width));
+            for (y, (smooth, confidence)) in (band * ROWS_AT_ONCE..).zip(rows) {
+                if !area.rows.contains(&y) {
+                    confidence.fill(0.0);
+                    continue;
+                }
+                confidence[..columns.start].fill(0.0);
+                confidence[columns.end..].fill(0.0);
+                let (smooth, confidence) =
+                    (&mut smooth[columns.clone()], &mut confidence[columns.clone()]);
+                dispatch!(level, simd => {
+                    median(simd, checked, outside, &area, y, smooth);
+                    sums.move_to(simd, y, evidence, &roi.matched, &area);
+                    trust.row(simd, &sums, smooth, confidence);
+                    distrust(smooth, confidence, least);
+                });
             }
-            confidence[..columns.start].fill(0.0);
-            confidence[columns.end..].fill(0.0);
-            let (smooth, confidence) =
-                (&mut smooth[columns.clone()], &mut confidence[columns.clone()]);
-            dispatch!(level, simd => {
-                median(simd, checked, outside, &area, y, smooth);
-                trust.row(simd, evidence, &roi.matched, &area, y, smooth, confidence);
-                distrust(smooth, confidence, least);
-            });
         });
         self.speckles.find(level, &self.smooth, &area, self.speckle_size, self.speckle_range);
         let speckles = &self.speckles;

@@ -1,4 +1,7 @@
-//! Confidence from the evidence around a pixel.
+//! Confidence from the mean evidence of those of the 9x9 pixels around that are
+//! matched.
+
+use std::ops::Range;
 
 use crate::image::Image;
 use crate::simd::Simd;
@@ -7,7 +10,6 @@ use crate::stage::stereo::NO_MATCH;
 
 /// Pixels from the centre of the window to its edge.
 pub const RADIUS: usize = 4;
-const SIDE: usize = 2 * RADIUS + 1;
 
 /// Columns at a time: their sums stay in registers and the nearest cache.
 const BLOCK: usize = 64;
@@ -38,49 +40,88 @@ impl Trust {
         Self { table }
     }
 
-    /// Writes the confidence of the pixels of row `y` in `area`, from the mean of
-    /// `evidence` over those of the 9x9 pixels around that are `matched`. A single
-    /// cost curve says little: that its neighbours are as clear, and none was
-    /// rejected, says more. Blocks of pixels without any disparity (`smooth`) get none.
+    /// Writes the confidence of the pixels of one row, from the mean evidence around
+    /// them. A single cost curve says little: that its neighbours are as clear, and none
+    /// was rejected, says more. Blocks of pixels without any disparity (`smooth`) get none.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "the inputs of one kernel")]
-    pub fn row<S: Simd>(
-        &self,
-        _: S,
-        evidence: &Image<u8>,
-        matched: &Image<u8>,
-        area: &Area,
-        y: usize,
-        smooth: &[i16],
-        out: &mut [f32],
-    ) {
-        let rows =
-            y.saturating_sub(RADIUS).max(area.rows.start)..(y + SIDE - RADIUS).min(area.rows.end);
+    pub fn row<S: Simd>(&self, _: S, sums: &Sums, smooth: &[i16], out: &mut [f32]) {
         for (block, (out, smooth)) in out.chunks_mut(BLOCK).zip(smooth.chunks(BLOCK)).enumerate() {
             if smooth.iter().fold(NO_MATCH, |most, &d| most.max(d)) == NO_MATCH {
                 out.fill(0.0);
                 continue;
             }
-            let x = area.columns.start + block * BLOCK;
-            // The window's columns, those outside the area empty.
-            let from = x.saturating_sub(RADIUS).max(area.columns.start);
-            let to = (x + BLOCK + RADIUS).min(area.columns.end);
-            let (mut sums, mut counts) = ([0_u16; SPAN], [0_u16; SPAN]);
-            for y in rows.clone() {
-                let (row, mask) = (&evidence.row(y)[from..to], &matched.row(y)[from..to]);
-                let at = from + RADIUS - x;
-                let pixels = sums[at..].iter_mut().zip(&mut counts[at..]).zip(row).zip(mask);
-                for (((sum, count), &e), &m) in pixels {
-                    *sum += e as u16;
-                    *count += (m != 0) as u16;
-                }
-            }
-            let (sums, counts) = (nine(&sums), nine(&counts));
+            let [evidence, matched] = [&sums.evidence, &sums.matched]
+                .map(|columns| columns[block * BLOCK..].first_chunk::<SPAN>());
+            let (Some(evidence), Some(matched)) = (evidence, matched) else { continue };
+            let (sums, counts) = (nine(evidence), nine(matched));
             for ((out, sum), count) in out.iter_mut().zip(sums).zip(counts) {
                 // Whole numbers: a quotient is cut as that of integers.
                 let mean = sum as f32 / (count as f32).max(1.0);
                 *out = self.table[(mean as u8) as usize];
             }
+        }
+    }
+}
+
+/// Sums over the rows of the 9x9 windows of one row's pixels, column by column of the
+/// area; [`RADIUS`] empty columns before, at least as many behind.
+#[derive(Debug, Default)]
+pub struct Sums {
+    /// Of the evidence.
+    evidence: Vec<u16>,
+    /// Of the pixels to match.
+    matched: Vec<u16>,
+    /// Rows in the sums.
+    rows: Range<usize>,
+}
+
+impl Sums {
+    /// Forgets all rows, for an area of so many columns.
+    pub fn clear(&mut self, columns: usize) {
+        let length = columns.next_multiple_of(BLOCK) + 2 * RADIUS;
+        for sums in [&mut self.evidence, &mut self.matched] {
+            sums.clear();
+            sums.resize(length, 0);
+        }
+        self.rows = 0..0;
+    }
+
+    /// Moves on to the windows around row `y`: not before the row it was moved to last.
+    #[inline(always)]
+    pub fn move_to<S: Simd>(
+        &mut self,
+        _: S,
+        y: usize,
+        evidence: &Image<u8>,
+        matched: &Image<u8>,
+        area: &Area,
+    ) {
+        let from = y.saturating_sub(RADIUS).max(area.rows.start);
+        let to = (y + RADIUS + 1).min(area.rows.end);
+        for y in self.rows.start..from.min(self.rows.end) {
+            self.add(
+                &evidence.row(y)[area.columns.clone()],
+                &matched.row(y)[area.columns.clone()],
+                |sum, v| sum - v,
+            );
+        }
+        for y in from.max(self.rows.end)..to {
+            self.add(
+                &evidence.row(y)[area.columns.clone()],
+                &matched.row(y)[area.columns.clone()],
+                |sum, v| sum + v,
+            );
+        }
+        self.rows = from..to;
+    }
+
+    #[inline(always)]
+    fn add(&mut self, evidence: &[u8], matched: &[u8], sum: impl Fn(u16, u16) -> u16) {
+        for (out, &e) in self.evidence[RADIUS..].iter_mut().zip(evidence) {
+            *out = sum(*out, e as u16);
+        }
+        for (out, &m) in self.matched[RADIUS..].iter_mut().zip(matched) {
+            *out = sum(*out, (m != 0) as u16);
         }
     }
 }
