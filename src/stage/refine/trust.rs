@@ -52,6 +52,7 @@ impl Trust {
             }
             let [evidence, matched] = [&sums.evidence, &sums.matched]
                 .map(|columns| columns[block * BLOCK..].first_chunk::<SPAN>());
+            // There always are as many: the sums end with whole blocks.
             let (Some(evidence), Some(matched)) = (evidence, matched) else { continue };
             let (sums, counts) = (nine(evidence), nine(matched));
             for ((out, sum), count) in out.iter_mut().zip(sums).zip(counts) {
