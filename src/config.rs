@@ -209,7 +209,7 @@ group!(
         paper: Paper = Paper::default(),
         threshold: f64 = 0.55,
         threshold_mode: ThresholdMode = ThresholdMode::Fixed,
-        temporal_smoothing: f64 = 0.7,
+        temporal_smoothing: f64 = 0.9,
     }
 );
 group!(

@@ -147,7 +147,7 @@ pub const FIELDS: &[Field] = &[
     live(
         "saliency.temporal_smoothing",
         Real(0.0, 1.0),
-        "Share of the previous frame's map in this frame's; 0 switches it off.",
+        "Share of the previous frame's map in this frame's where they are alike, half of it where they differ much; 0 switches it off.",
     ),
     live(
         "roi.dilation",

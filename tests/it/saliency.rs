@@ -488,6 +488,15 @@ fn flow_of_a_few_pixels_is_none() {
     }
 }
 
+/// All of it where a cell differs little from what it was, half where much.
+fn worth_of_the_past(now: f64, past: f64) -> f64 {
+    match (past - now).abs() {
+        little if little <= 0.1 => 1.0,
+        much if much >= 0.4 => 0.5,
+        change => 1.0 - (change - 0.1) / 0.6,
+    }
+}
+
 #[test]
 fn smoothing_blends_with_the_past_along_the_flow_and_a_reset_forgets_it() {
     let size = Size::new(331, 245);
@@ -511,8 +520,9 @@ fn smoothing_blends_with_the_past_along_the_flow_and_a_reset_forgets_it() {
     let expected = Image::from_fn(blend.size(), |x, y| {
         let (u, v) = (x as f32 + flow.dx.get(x, y), y as f32 + flow.dy.get(x, y));
         let now = f64::from(other.get(x, y));
-        let share = 0.25 * f64::from(flow.trust.get(x, y));
-        now + share * (plain::bilinear(&before, u.into(), v.into()) - now)
+        let trust = f64::from(flow.trust.get(x, y));
+        let past = plain::bilinear(&before, u.into(), v.into());
+        now + 0.25 * trust * worth_of_the_past(now, past) * (past - now)
     });
     assert_near(&blend, &expected, 1e-5, "blend");
     assert_near(&pixels, &plain::upsample(&blend, size), 1e-6, "full-size blend");
@@ -547,14 +557,15 @@ fn what_was_attended_to_stays_a_little_and_marks_itself() {
         };
         let smooth = Image::from_fn(size, |x, y| {
             let ((u, v, trust), now) = (place(x, y), f64::from(value(x, y, 2)));
-            now + share * trust * (plain::bilinear(&old, u, v) - now)
+            let past = plain::bilinear(&old, u, v);
+            now + share * trust * worth_of_the_past(now, past) * (past - now)
         });
         assert_near(&out, &smooth, 1e-5, "smoothed");
         persistence.stay(&mut out, &mut marks);
         let stayed = Image::from_fn(size, |x, y| {
             let (u, v, trust) = place(x, y);
             let was = plain::bilinear(&past, u, v);
-            (smooth.get(x, y) + trust * (0.05 * was - 0.02 * (1.0 - was))).clamp(0.0, 1.0)
+            (smooth.get(x, y) + trust * (0.08 * was - 0.03 * (1.0 - was))).clamp(0.0, 1.0)
         });
         assert_near(&out, &stayed, 1e-5, "stayed");
         let expected = out.pixels().iter().map(|s| f32::from(u8::from(*s >= 0.55)));

@@ -6,12 +6,19 @@ use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, store_insid
 use crate::stage::saliency::PreviousFrame;
 use crate::stage::saliency::flow::Flow;
 
+/// Difference of two frames' maps up to which it is noise, and from which it is
+/// news: of what appears, goes, or moves otherwise than the flow says.
+const NOISE: f32 = 0.1;
+const NEWS: f32 = 0.4;
+/// What the past weighs against news, in parts of what it weighs against noise.
+const OLD: f32 = 0.5;
+
 /// What a cell gains that was attended to in the frame before, and one loses
 /// that was not: about the noise of a smoothed map. On video clips with masks
 /// outlines keep their place the better the larger both are; from twice as much
 /// on overlap is lost.
-const STAYS: f32 = 0.05;
-const COMES: f32 = 0.02;
+const STAYS: f32 = 0.08;
+const COMES: f32 = 0.03;
 
 /// The map's memory along the flow, with its buffer.
 #[derive(Debug)]
@@ -45,8 +52,10 @@ impl Persistence {
     }
 
     /// (1 - a) of this frame's map and a of the one before, the latter read where
-    /// each cell was then. What was not seen before has no past: there `a` fades
-    /// with the flow's trust, so that a new thing is attended to at once.
+    /// each cell was then. `a` is the share that was asked for where they differ by .1
+    /// and less, falling to half of it where they differ by .4 and more: small
+    /// differences are noise, large ones are news. What was not seen before has no past:
+    /// there `a` fades with the flow's trust, so that a new thing is attended to at once.
     pub fn smooth(&mut self, attention: &mut Image<f32>, before: &PreviousFrame, flow: &Flow) {
         self.gain.resize(attention.size());
         let kept = before.attended.size() == attention.size();
@@ -63,8 +72,8 @@ impl Persistence {
         }
     }
 
-    /// Adds to a smoothed map .05 where a cell was attended to in the frame before,
-    /// else -.02, times the flow's trust (hysteresis), within 0..=1; marks in
+    /// Adds to a smoothed map .08 where a cell was attended to in the frame before,
+    /// else -.03, times the flow's trust (hysteresis), within 0..=1; marks in
     /// `attended` as 1 what is attended to now, at the fixed threshold. A map that
     /// was not smoothed is left as it is.
     pub fn stay(&mut self, attention: &mut Image<f32>, attended: &mut Image<f32>) {
@@ -113,7 +122,10 @@ fn smooth<S: Simd>(
             let place = Place::new(size, here + dx, dy + y as f32);
             let now: f32x16<S> = padded(simd, attention.row(y), x, 0.0);
             let [past, attended] = place.of(simd, past);
-            store_inside(attention.row_mut(y), x, now + trust * share * (past - now));
+            let change = past - now;
+            let news = ((change.abs() - NOISE) * (1.0 / (NEWS - NOISE))).max(0.0).min(1.0);
+            let share = (1.0 - news * (1.0 - OLD)) * share;
+            store_inside(attention.row_mut(y), x, now + trust * share * change);
             store_inside(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
         }
     }
