@@ -23,7 +23,8 @@ const LOST: f32 = 0.5;
 /// point: 99.9 % of the chi-squared distribution with 3 degrees of freedom.
 const GATE: f64 = 16.27;
 /// Where boxes overlap too little, positions may continue a track up to this
-/// many times the largest lateral extent of track and region.
+/// many times the largest lateral extent of track and region, across the line of
+/// sight. Along it their covariances tell: far away depth is known to metres only.
 const REACH: f64 = 1.0;
 /// Largest ratio of the boxes' widths and heights in that case: of what stands, more
 /// or less of the height is seen.
@@ -343,8 +344,8 @@ fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     if track.bounds.is_part(&bounds) {
         return Some(0.5 * (1.0 + iou) * nearness);
     }
-    let metres = (0..3).map(|i| (estimate[i] - region.position[i]).powi(2)).sum::<f64>().sqrt();
+    let across = (estimate[0] - region.position[0]).hypot(estimate[1] - region.position[1]);
     let [width, height, _] = region.extent;
     let lateral = width.max(height).max(track.last.extent[0]).max(track.last.extent[1]);
-    (metres <= REACH * lateral && same_size).then_some(0.5 * nearness)
+    (across <= REACH * lateral && same_size).then_some(0.5 * nearness)
 }

@@ -253,6 +253,19 @@ fn an_id_comes_back_to_what_is_the_same_thing_only() {
 }
 
 #[test]
+fn a_far_thing_keeps_its_id_as_far_as_its_depth_is_known() {
+    // At 45 m one standard deviation is 2 m; the boxes overlap by a tenth.
+    for (jump, same) in [([0.5, 3.0], true), ([0.5, 20.0], false), ([1.9, 0.0], false)] {
+        let mut driver = Driver::new(&Config::default());
+        for k in 0..5 {
+            driver.frame(f64::from(k) * 0.1, &[person(1.0, 45.0)]);
+        }
+        let found = driver.frame(0.5, &[person(1.0 + jump[0], 45.0 + jump[1])]);
+        assert_eq!(found[0].track_id == 1, same, "{jump:?}");
+    }
+}
+
+#[test]
 fn a_track_that_is_followed_comes_before_one_that_was_given_up() {
     let mut driver = Driver::new(&Config::default());
     // One walks towards the place where another one was seen last, and is there
