@@ -11,6 +11,7 @@ use salient_stereo::perception::{Region, RegionList, Rejections, View};
 use salient_stereo::simd;
 use salient_stereo::stage::coarse::CoarseDisparity;
 use salient_stereo::stage::depth::Depth;
+use salient_stereo::stage::ground::Plane;
 use salient_stereo::stage::regions::candidates::{Candidates, PixelBox};
 use salient_stereo::stage::regions::components::{Components, agree};
 use salient_stereo::stage::regions::contour::Contour;
@@ -520,6 +521,56 @@ fn neighbours_at_two_depths_are_two_regions_and_panes_are_one() {
     assert_eq!(regions.len(), 3);
     assert_ne!(labels.get(39, 20), labels.get(40, 20));
     assert_eq!(labels.get(85, 20), labels.get(98, 22));
+}
+
+#[test]
+fn a_hole_at_the_rim_of_what_stands_belongs_to_what_it_looks_like() {
+    let size = Size::new(160, 120);
+    let camera = |tx| Camera::pinhole(size, 420.0, 80.0, 40.0, tx);
+    let rig = StereoRig::new(camera(0.0), camera(-210.0), 0.0).unwrap();
+    let slope = 0.5 / 1.55;
+    let plane = Plane::new(slope, 0.0, -40.0 * slope, &rig).unwrap();
+    // 15 m away, 1.4 m wide and high; of its two last columns nothing was measured.
+    let thing = |x: usize, y: usize| (60..100).contains(&x) && (45..84).contains(&y);
+    let disparity = Image::from_fn(size, |x, y| match thing(x, y) {
+        true if x >= 98 => f32::NAN,
+        true => 14.0,
+        false => (slope * (y as f32 - 40.0)).max(2.0),
+    });
+    let all = bits(&Image::filled(size, true));
+    let roi = Masks { matched: all.clone(), salient: all };
+    let attention = Image::filled(size.divided_by(4), 0.8);
+    let confidence = Image::filled(size, 0.9);
+    let nothing = Image::filled(size.divided_by(4), f32::NAN);
+    let coarse = CoarseDisparity { checked: nothing.clone(), filled: nothing };
+    for (rim, last) in [(80, 99), (140, 97)] {
+        let gray = Image::from_fn(size, |x, y| match thing(x, y) {
+            true if x >= 98 => rim,
+            true => 80,
+            false => 140,
+        });
+        let left = View { gray, is_gray: true, ..View::default() };
+        for level in simd::available() {
+            let source = RegionSource {
+                left: &left,
+                attention: &attention,
+                roi: &roi,
+                disparity: &disparity,
+                coarse: &coarse,
+                confidence: &confidence,
+                rig: &rig,
+                plane: Some(&plane),
+                table: None,
+            };
+            let mut out = (Image::default(), RegionList::default(), Rejections::default());
+            let mut regions = Regions::new(&Config::default(), size, level);
+            regions.run(&source, &mut out.0, &mut out.1, &mut out.2);
+            assert_eq!(out.1.len(), 1);
+            let row = out.0.row(60);
+            let first = row.iter().position(|label| *label != 0);
+            assert_eq!((first, row.iter().rposition(|label| *label != 0)), (Some(60), Some(last)));
+        }
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Regions of things that stand on the ground, from the fine disparity.
 
+mod close;
 mod paint;
 mod post;
 mod shrink;

@@ -6,6 +6,7 @@ use crate::stage::regions::RegionSource;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
 use crate::stage::regions::components::tolerance;
 use crate::stage::regions::runs::{Spans, edge_words, find_edges};
+use crate::stage::regions::upright::close::close;
 use crate::stage::roi::bits::{BitMask, bits_from, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};
 
@@ -76,8 +77,8 @@ impl Painter {
 
     /// Fills `out` with `count` candidates from as many `things`: those pixels
     /// of a thing's cells that do not contradict its surface, and those of the
-    /// cells beside and above that agree with it. Bits of `fine` are cells whose
-    /// disparity was measured finely.
+    /// cells beside and above that agree with it, small holes closed ([`close`]). Bits of
+    /// `fine` are cells whose disparity was measured finely.
     pub fn run(
         &mut self,
         plane: &Plane,
@@ -200,7 +201,13 @@ impl Painter {
                 for y in rows.clone() {
                     // What does not rise above the ground is none of the thing.
                     let ground = slope + plane.a * y as f32 + plane.c + GROUND_PX;
-                    let d: f32x16<S> = padded(simd, source.disparity.row(y), x, f32::NAN);
+                    let mut d: f32x16<S> = padded(simd, source.disparity.row(y), x, f32::NAN);
+                    // Those inside of a thing are its own anyway.
+                    let open = !d.simd_eq(d).to_bitmask() & all & !inside;
+                    if open != 0 {
+                        let closed = close(simd, source.disparity, &source.left.gray, (x, y));
+                        d = mask32x16::from_bitmask(simd, open).select(closed, d);
+                    }
                     let on = (d - surface).abs().simd_le(tolerance) & d.simd_gt(ground);
                     let mut bits = on.to_bitmask() & all;
                     let holes = !d.simd_eq(d).to_bitmask() & own & all;

@@ -1,0 +1,168 @@
+//! Holes of the disparity, closed by what looks alike beside them.
+
+use crate::image::Image;
+use crate::simd::{Simd, f32x16, padded, prelude::*};
+
+/// Pixels to each side, above and below in which the nearest disparity is asked.
+const REACH: isize = 2;
+/// What a pixel of distance counts in levels of brightness, and how much a hole may
+/// differ from where its disparity comes from, the distance counted in.
+const PER_PX: f32 = 10.0;
+const MOST: f32 = 30.0;
+
+/// Pixels that are looked at together.
+const LANES: usize = 16;
+
+/// What the pixels from `(x, y)` on take if they are holes of the `disparity` (NaN): of the
+/// nearest disparities to the left and right, above and below, within two pixels, that
+/// whose pixel is most like them (difference in brightness, and 10 for each pixel of
+/// distance), if this is no more than 30; of equals the smaller one; else NaN.
+///
+/// Outlines of things are made with it: what is hardly textured has holes that belong
+/// to it. What is published keeps them.
+#[inline(always)]
+pub fn close<S: Simd>(
+    simd: S,
+    disparity: &Image<f32>,
+    gray: &Image<u8>,
+    (x, y): (usize, usize),
+) -> f32x16<S> {
+    let here = brightness(simd, gray.row(y), x, 0);
+    let none = f32x16::splat(simd, f32::NAN);
+    let (mut least, mut found) = (f32x16::splat(simd, f32::INFINITY), none);
+    for (across, down) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+        let (mut unlike, mut nearest) = (least, none);
+        // What is nearer is written over what is farther.
+        for step in (1..=REACH).rev() {
+            let row = y.checked_add_signed(step * down).filter(|row| *row < disparity.height());
+            let Some(row) = row else { continue };
+            let other = shifted(simd, disparity.row(row), x, step * across);
+            let change = (brightness(simd, gray.row(row), x, step * across) - here).abs();
+            let known = other.simd_eq(other);
+            unlike = known.select(change + PER_PX * step as f32, unlike);
+            nearest = known.select(other, nearest);
+        }
+        let better = unlike.simd_lt(least) | (unlike.simd_eq(least) & nearest.simd_lt(found));
+        let better = better & unlike.simd_le(MOST) & nearest.simd_eq(nearest);
+        least = better.select(unlike, least);
+        found = better.select(nearest, found);
+    }
+    found
+}
+
+/// The values `by` columns beside those from column `x` on; NaN beyond the row.
+#[inline(always)]
+fn shifted<S: Simd>(simd: S, row: &[f32], x: usize, by: isize) -> f32x16<S> {
+    match x.checked_add_signed(by) {
+        Some(x) => padded(simd, row, x, f32::NAN),
+        None => f32x16::from_fn(simd, |i| {
+            (x + i).checked_add_signed(by).and_then(|x| row.get(x)).copied().unwrap_or(f32::NAN)
+        }),
+    }
+}
+
+/// The same of brightness; any value beyond the row.
+#[inline(always)]
+fn brightness<S: Simd>(simd: S, row: &[u8], x: usize, by: isize) -> f32x16<S> {
+    let mut values = [0.0; LANES];
+    match x.checked_add_signed(by).and_then(|x| row.get(x..)?.first_chunk::<LANES>()) {
+        Some(bytes) => {
+            for i in 0..LANES {
+                values[i] = f32::from(bytes[i]);
+            }
+        }
+        None => {
+            for (i, value) in values.iter_mut().enumerate() {
+                let byte = (x + i).checked_add_signed(by).and_then(|x| row.get(x));
+                *value = byte.map_or(0.0, |byte| f32::from(*byte));
+            }
+        }
+    }
+    f32x16::load_array(simd, values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Size;
+    use crate::simd::{self, dispatch};
+
+    /// All of an image, in groups of sixteen from every column on.
+    fn closed(disparity: &Image<f32>, gray: &Image<u8>) -> Vec<Image<f32>> {
+        let mut results = Vec::new();
+        for level in simd::available() {
+            let mut out = Image::new(disparity.size());
+            for y in 0..out.height() {
+                for x in 0..out.width() {
+                    dispatch!(level, simd => {
+                        let group = close(simd, disparity, gray, (x, y));
+                        let row = &mut out.row_mut(y)[x..];
+                        let inside = row.len().min(LANES);
+                        row[..inside].copy_from_slice(&group.as_slice()[..inside]);
+                    });
+                }
+            }
+            results.push(out);
+        }
+        results
+    }
+
+    /// As the words say it.
+    fn plain(disparity: &Image<f32>, gray: &Image<u8>, x: usize, y: usize) -> f32 {
+        let at = |u: isize, v: isize| {
+            let (u, v) = (usize::try_from(u).ok()?, usize::try_from(v).ok()?);
+            (u < gray.width() && v < gray.height()).then(|| (disparity.get(u, v), gray.get(u, v)))
+        };
+        let (x, y) = (x as isize, y as isize);
+        let (_, look) = at(x, y).unwrap();
+        let nearest = |(across, down): (isize, isize)| {
+            let (step, (d, other)) = (1..=2)
+                .filter_map(|step| Some((step, at(x + step * across, y + step * down)?)))
+                .find(|(_, (d, _))| !d.is_nan())?;
+            Some((u32::from(look.abs_diff(other)) + 10 * step as u32, d))
+        };
+        let around = [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter().filter_map(nearest);
+        let alike = around.filter(|(unlike, _)| *unlike <= 30);
+        let best = alike.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        best.map_or(f32::NAN, |(_, d)| d)
+    }
+
+    #[test]
+    fn a_pixel_takes_the_nearest_that_is_alike() {
+        let sizes = [(1, 1), (2, 3), (1, 9), (17, 5), (40, 12)];
+        for (size, holes) in sizes.into_iter().flat_map(|size| [(size, 3), (size, 7)]) {
+            let mut state = 11_u64;
+            let mut next = |below: u64| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (state >> 40) % below
+            };
+            let size = Size::new(size.0, size.1);
+            let disparity = Image::from_fn(size, |_, _| {
+                if next(10) < holes { f32::NAN } else { next(4) as f32 / 4.0 + 8.0 }
+            });
+            let gray = Image::from_fn(size, |_, _| 100 + next(40) as u8);
+            for found in closed(&disparity, &gray) {
+                for y in 0..size.height {
+                    for x in 0..size.width {
+                        let (found, expected) = (found.get(x, y), plain(&disparity, &gray, x, y));
+                        assert_eq!(found.to_bits(), expected.to_bits(), "({x}, {y}) of {size}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn large_holes_and_those_that_look_otherwise_stay() {
+        let size = Size::new(24, 1);
+        let disparity = Image::from_fn(size, |x, _| if x < 8 { 5.0 } else { f32::NAN });
+        // Edge of what looks alike, and of what takes its disparity.
+        let look = |at: usize| Image::from_fn(size, move |x, _| if x < at { 90 } else { 130 });
+        for (edge, last) in [(24, 10), (9, 9), (8, 8)] {
+            for found in closed(&disparity, &look(edge)) {
+                assert!(found.row(0)[..last].iter().all(|d| *d == 5.0), "{edge}");
+                assert!(found.row(0)[last..].iter().all(|d| d.is_nan()), "{edge}");
+            }
+        }
+    }
+}
