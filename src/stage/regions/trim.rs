@@ -16,9 +16,9 @@ use crate::simd::{LANES, Level, Simd, abs_diff, dispatch, load, prelude::*, u8x3
 /// Width in metres (of a road scene) up to which a thing is narrow: a person
 /// who walks, a trunk, a post.
 pub const NARROW_M: f32 = 1.2;
-/// Most pixels that are cut from one end of a row, and most parts of the row.
+/// Most pixels that are cut from one end of a row, and the largest part of the row.
 const MOST_PX: usize = 6;
-const MOST_PART: usize = 3;
+const MOST_PART: f32 = 0.4;
 /// Rows above and below over which an edge is added up, every other one: sides
 /// are upright.
 const BAND: usize = 3;
@@ -54,7 +54,7 @@ pub struct Trim<'a> {
 impl Trim<'_> {
     /// Moves both ends of every row of candidate `id`, counted from 1, inward to the strongest
     /// upright edge (maximum over R, G and B of |I(x + 1) − I(x − 1)|, added up
-    /// over four of seven rows) within six pixels and a third of the row. An end at
+    /// over four of seven rows) within six pixels and two fifths of the row. An end at
     /// something nearer stays: there it is the other thing that grew.
     pub fn run(&self, level: Level, id: u32, out: &mut Candidates) {
         dispatch!(level, simd => self.cut(simd, id, out));
@@ -85,7 +85,7 @@ impl Trim<'_> {
     /// The new ends of the pixels `from..to` of row `y`.
     #[inline(always)]
     fn ends<S: Simd>(&self, simd: S, from: usize, to: usize, y: usize) -> [usize; 2] {
-        let most = MOST_PX.min((to - from) / MOST_PART);
+        let most = MOST_PX.min(((to - from) as f32 * MOST_PART) as usize);
         let hidden = |x: Option<usize>| {
             let beside = x.and_then(|x| self.disparity.row(y).get(x));
             beside.is_some_and(|d| *d > NEARER * self.surface)

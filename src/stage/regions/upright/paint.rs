@@ -13,8 +13,9 @@ use crate::stage::standing::{HIGH, Things, WIDE};
 /// Largest difference of a pixel from its surface in parts of the disparity.
 const SURFACE_PART: f32 = 0.1;
 const SURFACE_PX: f32 = 0.7;
-/// Pixels of disparity by which one of a thing's exceeds the ground's.
+/// By how much a disparity of a thing exceeds the ground's: pixels, and parts of it more.
 const GROUND_PX: f32 = 0.3;
+const GROUND_PART: f32 = 0.02;
 
 /// Pixels of a row that are painted at once.
 const LANES: usize = 16;
@@ -197,10 +198,12 @@ impl Painter {
                 let own = holes.simd_ge(u8x16::splat(simd, OWN)).to_bitmask();
                 let inside = holes.simd_eq(u8x16::splat(simd, INSIDE)).to_bitmask();
                 let all = u64::MAX >> (64 - LANES.min(columns.end - x));
+                // What a thing's disparity exceeds, less what the ground's changes by column and row.
+                let rise = surface * GROUND_PART + (plane.c + GROUND_PX);
                 let (mut seen, mut seen_rows, mut area) = (0, 0_u64, 0);
                 for y in rows.clone() {
                     // What does not rise above the ground is none of the thing.
-                    let ground = slope + plane.a * y as f32 + plane.c + GROUND_PX;
+                    let ground = slope + plane.a * y as f32 + rise;
                     let mut d: f32x16<S> = padded(simd, source.disparity.row(y), x, f32::NAN);
                     // Those inside of a thing are its own anyway.
                     let open = !d.simd_eq(d).to_bitmask() & all & !inside;
