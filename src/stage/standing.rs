@@ -194,11 +194,16 @@ impl Standing {
         dispatch!(*level, simd => {
             for (s, &thing) in columns.segments.iter().zip(&*thing) {
                 let index = thing as usize - 1;
-                if seen[index] != 0 {
-                    let [free, hidden] = sides(simd, disparity, s);
-                    things[index].free += free;
-                    things[index].hidden += hidden;
+                if seen[index] == 0 {
+                    continue;
                 }
+                let thing = &mut things[index];
+                // What is held up is seen by what is above the heights that are looked at, too.
+                let held = thing.is_narrow() && !thing.stands() && s.top != Top::Tall;
+                let upper = if held { s.reach } else { s.upper };
+                let [free, hidden] = sides(simd, disparity, &Segment { upper, ..*s });
+                thing.free += free;
+                thing.hidden += hidden;
             }
         });
     }

@@ -190,6 +190,10 @@ fn a_sign_on_a_post_that_is_not_seen_is_a_thing_up_to_its_top() {
     let found = things(&upright(&[high, van]));
     assert_eq!(found.list.len(), 2, "{:?}", found.list);
     assert_ne!(at(&found, 2.0, 2.5), 0);
+    // A far one, of which a row or two of cells are as low as that.
+    let far = [1.7, 2.3, 2.35, 2.95, 20.0];
+    let found = things(&upright(&[far]));
+    assert_eq!((found.list.len(), found.floating), (1, 0));
     // One on a wall just behind it is none, and one that something nearer covers at a side.
     let wall = [-3.0, 6.0, 1.5, 3.5, 10.3];
     assert_eq!(at(&things(&upright(&[sign, wall])), 2.0, 2.3), 0);

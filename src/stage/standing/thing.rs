@@ -28,7 +28,7 @@ const PLATE_M: f32 = 0.3;
 /// Share of its sides, of so many cells at least, behind which it is farther away: of a
 /// patch of wall, around which little was measured, fewer are known.
 const PLATE_FREE: f32 = 0.8;
-const PLATE_SIDES: u32 = 6;
+const PLATE_SIDES: u32 = 5;
 
 /// One thing on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
