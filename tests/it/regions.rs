@@ -399,7 +399,7 @@ fn statistics_follow_their_plain_formulas() {
     let s: Vec<f64> = pixels.iter().map(|&i| f64::from(saliency.pixels()[i])).collect();
     near(r.mean_saliency, s.iter().sum::<f64>() / s.len() as f64);
     near(r.max_saliency, s.iter().copied().fold(0.0, f64::max));
-    let score = -3.3 + 0.9 * (pixels.len() as f64 / 1000.0).ln() + 5.4 * n / pixels.len() as f64;
+    let score = -2.5 + 0.9 * (pixels.len() as f64 / 1000.0).ln() + 4.2 * n / pixels.len() as f64;
     near(r.confidence, 1.0 / (1.0 + (-score).exp()));
     assert_eq!(r.mask.len(), 31 * 23);
     assert_eq!(r.mask.iter().filter(|m| **m != 0).count(), pixels.len());
