@@ -14,8 +14,11 @@ pub const LOW_M: f32 = 0.2;
 const CONTACT_M: f32 = 0.6;
 /// A surface that reaches higher than a lorry is part of a building, a tree or a pole.
 pub const TALL_M: f32 = 4.2;
-/// Cells above a segment among which the next disparity is looked for.
+/// Cells above a segment among which the next disparity is looked for, and those up to
+/// which something farther away is hidden by it: what only one camera sees above the
+/// edge of a roof was not measured.
 const LOOK_UP: f32 = 6.0;
+const LOOK_BEHIND: f32 = 4.0;
 /// Largest distance of a cell from its segment's mean disparity, in parts: the bonnet
 /// of a car and what is parked a metre before it are two.
 const SEGMENT_PART: f32 = 0.1;
@@ -169,7 +172,8 @@ impl<S: Simd> Climb<S> {
         // What is farther away stands on the one below or is hidden by it; directly
         // above a cell of the ground, something stands on that.
         let hidden = ended & d.simd_lt(self.mean);
-        let carried = close & (hidden | (self.on_ground & !ended));
+        let behind = hidden & gap.simd_le(LOOK_BEHIND);
+        let carried = behind | (close & self.on_ground & !ended);
         let grows = on & !high;
         let takes = starts | grows;
         self.sum = starts.select(d, grows.select(self.sum + d, self.sum));
@@ -276,8 +280,10 @@ mod tests {
         while let Some(&first) = cells.get(i) {
             let below = i.checked_sub(1).map(|j| cells[j]);
             let gap = holes(below.map_or(disparity.height(), |below| below.0), first.0);
-            let carries = ended.map_or(below.is_none_or(low), |mean| first.1 < mean);
-            ended = None;
+            let carried = match ended.take() {
+                Some(mean) => gap <= LOOK_BEHIND && first.1 < mean,
+                None => gap <= MAX_HOLES && below.is_none_or(low),
+            };
             i += 1;
             if low(first) || first.2 > HIGH_M {
                 continue;
@@ -291,7 +297,7 @@ mod tests {
                 sum: first.1,
                 bottom_m: first.2,
                 top_m: first.2,
-                contact: gap <= MAX_HOLES && carries || first.2 <= CONTACT_M * scale,
+                contact: carried || first.2 <= CONTACT_M * scale,
                 top: Top::Free,
             };
             loop {

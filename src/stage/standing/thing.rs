@@ -13,7 +13,7 @@ const LEAST_TOP_M: f32 = 0.35;
 /// and this part of its length: a bank of earth or a kerb is lower.
 const LEAST_RISE: f32 = 0.1;
 /// Share of a thing's columns that must reach the ground.
-const LEAST_CONTACT: f32 = 0.3;
+const LEAST_CONTACT: f32 = 0.2;
 /// Share of a thing's sides that must be free of anything nearer.
 const LEAST_FREE: f32 = 0.3;
 
