@@ -226,7 +226,7 @@ pub const FIELDS: &[Field] = &[
     live(
         "regions.min_area",
         Integer(1, 10_000_000),
-        "Smallest region in pixels. On a ground or table regions of a confidence below 0.5 are refused as well: small ones with few disparities.",
+        "Smallest region in pixels. On a ground or table regions of a confidence below 0.45 are refused as well: small ones with few disparities.",
     ),
     live(
         "regions.max_count",

@@ -198,7 +198,8 @@ impl Standing {
                     continue;
                 }
                 let thing = &mut things[index];
-                // What is held up is seen by what is above the heights that are looked at, too.
+                // What is held up is asked along its whole height: of a far or high plate
+                // only a row or two lie below the heights that are climbed.
                 let held = thing.is_narrow() && !thing.stands() && s.top != Top::Tall;
                 let upper = if held { s.reach } else { s.upper };
                 let [free, hidden] = sides(simd, disparity, &Segment { upper, ..*s });

@@ -4,6 +4,8 @@ pub mod common;
 pub mod follow;
 pub mod kalman;
 
+use nalgebra::Vector3;
+
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::Image;
@@ -320,8 +322,9 @@ impl Views<'_> {
 /// Boxes that overlap by `min_iou` score `1 + IoU`, lowered by the distance in
 /// space; of boxes one of which lies in the other, as when a thing is seen in part or
 /// together with another one for a frame, half as much. Boxes that do neither score
-/// by that distance alone, if it is small against the object itself. A track that
-/// was given up is continued only by what has its size.
+/// by that distance alone, if they have one size and it is small across the line of
+/// sight against the object itself. A track that was given up is continued only by
+/// what has its size.
 fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     let bounds = Box2::of(region);
     let iou = track.bounds.iou(&bounds);
@@ -344,8 +347,16 @@ fn affinity(track: &Follow, region: &Region, min_iou: f32) -> Option<f32> {
     if track.bounds.is_part(&bounds) {
         return Some(0.5 * (1.0 + iou) * nearness);
     }
-    let across = (estimate[0] - region.position[0]).hypot(estimate[1] - region.position[1]);
+    let across = across(&estimate, &region.position);
     let [width, height, _] = region.extent;
     let lateral = width.max(height).max(track.last.extent[0]).max(track.last.extent[1]);
     (across <= REACH * lateral && same_size).then_some(0.5 * nearness)
+}
+
+/// Distance of a point from another one across the line of sight to that, metres.
+fn across(from: &[f64; 3], to: &[f64; 3]) -> f64 {
+    let (from, to) = (Vector3::from(*from), Vector3::from(*to));
+    let off = to - from;
+    let along = from.try_normalize(0.0).map_or(0.0, |sight| off.dot(&sight));
+    (off.norm_squared() - along * along).max(0.0).sqrt()
 }

@@ -49,7 +49,12 @@ fn see(things: &[Thing]) -> RegionList {
         ]);
         r.position = thing.at;
         let sigma_z = z * z / (F * BASELINE) * 0.2;
-        r.position_covariance = [1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, sigma_z * sigma_z];
+        // Along the line of sight, and a centimetre across.
+        let sight = [x / z, y / z, 1.0];
+        r.position_covariance = std::array::from_fn(|i| {
+            let across = if i % 4 == 0 { 1e-4 } else { 0.0 };
+            sigma_z * sigma_z * sight[i / 3] * sight[i % 3] + across
+        });
         r.extent = [thing.size[0], thing.size[1], 0.5];
         r.confidence = 0.8;
         r.mean_saliency = 0.7;
@@ -254,14 +259,28 @@ fn an_id_comes_back_to_what_is_the_same_thing_only() {
 
 #[test]
 fn a_far_thing_keeps_its_id_as_far_as_its_depth_is_known() {
-    // At 45 m one standard deviation is 2 m; the boxes overlap by a tenth.
-    for (jump, same) in [([0.5, 3.0], true), ([0.5, 20.0], false), ([1.9, 0.0], false)] {
+    // Seen once or often, then on the line of sight to where it was, or beside it.
+    let id = |sightings: u32, [x, z]: [f64; 2], along: f64, aside: f64| {
         let mut driver = Driver::new(&Config::default());
-        for k in 0..5 {
-            driver.frame(f64::from(k) * 0.1, &[person(1.0, 45.0)]);
+        for k in 0..sightings {
+            driver.frame(f64::from(k) * 0.1, &[person(x, z)]);
         }
-        let found = driver.frame(0.5, &[person(1.0 + jump[0], 45.0 + jump[1])]);
-        assert_eq!(found[0].track_id == 1, same, "{jump:?}");
+        let stretch = 1.0 + along / z;
+        let now = person(x * stretch + aside, z * stretch);
+        driver.frame(
+            f64::from(sightings) * 0.1,
+            &[Thing { at: [now.at[0], 0.3 * stretch, now.at[2]], ..now }],
+        )[0]
+        .track_id
+    };
+    // At 45 m one standard deviation is 2 m, ahead and at the edge of the view.
+    for place in [[1.0, 45.0], [25.0, 45.0]] {
+        assert_eq!(id(5, place, 4.0, 0.4), 1);
+        assert_ne!(id(5, place, 20.0, 0.0), 1);
+        // After one sighting all of this is within what is not known, but a step aside of
+        // more than its size is another one.
+        assert_eq!(id(1, place, 4.0, 0.4), 1);
+        assert_ne!(id(1, place, 0.0, 2.2), 1);
     }
 }
 

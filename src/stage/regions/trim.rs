@@ -18,7 +18,7 @@ use crate::simd::{LANES, Level, Simd, abs_diff, dispatch, load, prelude::*, u8x3
 pub const NARROW_M: f32 = 1.2;
 /// Most pixels that are cut from one end of a row, and the largest part of the row.
 const MOST_PX: usize = 6;
-const MOST_PART: f32 = 0.4;
+const MOST_PART: [usize; 2] = [2, 5];
 /// Rows above and below over which an edge is added up, every other one: sides
 /// are upright.
 const BAND: usize = 3;
@@ -85,7 +85,7 @@ impl Trim<'_> {
     /// The new ends of the pixels `from..to` of row `y`.
     #[inline(always)]
     fn ends<S: Simd>(&self, simd: S, from: usize, to: usize, y: usize) -> [usize; 2] {
-        let most = MOST_PX.min(((to - from) as f32 * MOST_PART) as usize);
+        let most = MOST_PX.min((to - from) * MOST_PART[0] / MOST_PART[1]);
         let hidden = |x: Option<usize>| {
             let beside = x.and_then(|x| self.disparity.row(y).get(x));
             beside.is_some_and(|d| *d > NEARER * self.surface)
@@ -223,6 +223,25 @@ mod tests {
             assert!((13..=14).contains(&b.x0) && (22..=23).contains(&b.x1), "{b:?}");
             assert_eq!((b.y0, b.y1, b.area), (2, 18, area));
             assert!((8 * 16..=10 * 16).contains(&area), "{area}");
+        }
+    }
+
+    #[test]
+    fn a_third_of_a_short_row_is_cut_and_no_half() {
+        // Of ten pixels the image shows two, four and six further inward.
+        for (edge, expected) in [(12, 12), (14, 14), (16, 10)] {
+            let gray = Image::from_fn(SIZE, |x, _| if x < edge { 40 } else { 200 });
+            let left = View { gray, is_gray: true, ..View::default() };
+            let disparity = Image::filled(SIZE, 10.0);
+            let mut out = Candidates::default();
+            out.clear(SIZE, 2);
+            for y in 2..18 {
+                out.ids.row_mut(y)[10..20].fill(2);
+                out.boxes[1].add(10, y, 0x3ff);
+            }
+            let trim = Trim { left: &left, disparity: &disparity, surface: 10.0 };
+            trim.run(simd::detect(), 2, &mut out);
+            assert!(out.boxes[1].x0.abs_diff(expected) <= 1, "{:?}", out.boxes[1]);
         }
     }
 

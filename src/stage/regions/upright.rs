@@ -1,6 +1,6 @@
 //! Regions of things that stand on the ground, from the fine disparity.
 
-mod close;
+mod fill;
 mod paint;
 mod post;
 mod shrink;

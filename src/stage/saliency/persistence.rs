@@ -13,10 +13,9 @@ const NEWS: f32 = 0.4;
 /// What the past weighs against news, in parts of what it weighs against noise.
 const OLD: f32 = 0.5;
 
-/// What a cell gains that was attended to in the frame before, and one loses
-/// that was not: about the noise of a smoothed map. On video clips with masks
-/// outlines keep their place the better the larger both are; from twice as much
-/// on overlap is lost.
+/// What a cell gains that was attended to in the frame before, and one loses that was
+/// not, less than a change that counts as noise. On video clips with masks outlines keep
+/// their place the better the larger both are, and ghosts of what has gone stay longer.
 const STAYS: f32 = 0.08;
 const COMES: f32 = 0.03;
 

@@ -343,6 +343,30 @@ mod tests {
     }
 
     #[test]
+    fn what_is_hidden_below_is_so_across_a_few_missing_cells() {
+        let size = Size::new(640, 376);
+        let camera = |tx| Camera::pinhole(size, 500.0, 320.0, 120.0, tx);
+        let rig = StereoRig::new(camera(0.0), camera(-250.0), 0.0).unwrap();
+        let plane = Plane::new(0.3, 0.0, -36.0, &rig).unwrap();
+        // Column by column a wider strip without disparity between a car and a trunk behind it.
+        let map = Image::from_fn(Size::new(LANES, 94), |missing, y| match y {
+            y if y + missing < 40 && y >= 16 => 12.0,
+            0..40 => f32::NAN,
+            40..70 => 36.0,
+            _ => plane.disparity(centre(missing, y).0, centre(missing, y).1),
+        });
+        for level in simd::available() {
+            let mut found = Vec::new();
+            dispatch!(level, simd => climb(simd, 0, &map, &plane, &mut found));
+            for missing in 0..9 {
+                let of = |s: &&Segment| s.x as usize == missing && s.upper < 40;
+                let trunk = found.iter().find(of).expect("a trunk");
+                assert_eq!(trunk.contact, missing <= 4, "{missing}");
+            }
+        }
+    }
+
+    #[test]
     fn the_segments_of_many_columns_are_those_of_each() {
         let size = Size::new(640, 376);
         let camera = |tx| Camera::pinhole(size, 500.0, 320.0, 120.0, tx);

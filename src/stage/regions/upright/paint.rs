@@ -6,14 +6,16 @@ use crate::stage::regions::RegionSource;
 use crate::stage::regions::candidates::{Candidates, PixelBox};
 use crate::stage::regions::components::tolerance;
 use crate::stage::regions::runs::{Spans, edge_words, find_edges};
-use crate::stage::regions::upright::close::close;
+use crate::stage::regions::upright::fill::fill;
 use crate::stage::roi::bits::{BitMask, bits_from, first_set, last_set};
 use crate::stage::standing::{HIGH, Things, WIDE};
 
 /// Largest difference of a pixel from its surface in parts of the disparity.
 const SURFACE_PART: f32 = 0.1;
 const SURFACE_PX: f32 = 0.7;
-/// By how much a disparity of a thing exceeds the ground's: pixels, and parts of it more.
+/// By how much a disparity of a thing exceeds the ground's: pixels, and parts of its
+/// surface's. Around the foot of a thing the matcher carries its disparity on over the
+/// bare ground, and the nearer it is the farther.
 const GROUND_PX: f32 = 0.3;
 const GROUND_PART: f32 = 0.02;
 
@@ -27,8 +29,8 @@ const CELL_BITS: u64 = (1 << WIDE) - 1;
 // A group is made of whole cells of two pixels.
 const _: () = assert!(WIDE == 2 && LANES == 16);
 
-/// What holes in a cell are: none of the thing, of the thing where nothing was
-/// matched, of the thing.
+/// What holes in a cell are, if what is beside them does not tell: none of the thing, of the
+/// thing where nothing was matched. Or they are of the thing whatever is beside them.
 const OUTSIDE: u8 = 0;
 const OWN: u8 = 1;
 const INSIDE: u8 = 2;
@@ -78,7 +80,7 @@ impl Painter {
 
     /// Fills `out` with `count` candidates from as many `things`: those pixels
     /// of a thing's cells that do not contradict its surface, and those of the
-    /// cells beside and above that agree with it, small holes closed ([`close`]). Bits of
+    /// cells beside and above that agree with it, small holes filled ([`fill`]). Bits of
     /// `fine` are cells whose disparity was measured finely.
     pub fn run(
         &mut self,
@@ -198,7 +200,7 @@ impl Painter {
                 let own = holes.simd_ge(u8x16::splat(simd, OWN)).to_bitmask();
                 let inside = holes.simd_eq(u8x16::splat(simd, INSIDE)).to_bitmask();
                 let all = u64::MAX >> (64 - LANES.min(columns.end - x));
-                // What a thing's disparity exceeds, less what the ground's changes by column and row.
+                // What the ground's disparity is raised by, with its constant part.
                 let rise = surface * GROUND_PART + (plane.c + GROUND_PX);
                 let (mut seen, mut seen_rows, mut area) = (0, 0_u64, 0);
                 for y in rows.clone() {
@@ -208,8 +210,8 @@ impl Painter {
                     // Those inside of a thing are its own anyway.
                     let open = !d.simd_eq(d).to_bitmask() & all & !inside;
                     if open != 0 {
-                        let closed = close(simd, source.disparity, &source.left.gray, (x, y));
-                        d = mask32x16::from_bitmask(simd, open).select(closed, d);
+                        let filled = fill(simd, source.disparity, &source.left.gray, (x, y));
+                        d = mask32x16::from_bitmask(simd, open).select(filled, d);
                     }
                     let on = (d - surface).abs().simd_le(tolerance) & d.simd_gt(ground);
                     let mut bits = on.to_bitmask() & all;
