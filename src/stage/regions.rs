@@ -51,8 +51,9 @@ const LEAST_WEIGHT: f32 = 0.05;
 const LEAST_CONFIDENCE: f32 = 0.45;
 /// Weights of the confidence. Logistic regression on 3600 regions of five rendered
 /// streets and a rendered table finds hardly more than area to tell (constant .8, area .9,
-/// share with disparity .7); these keep what few disparities say of the smallest, at a calibration error of .02 on all together and
-/// .02 to .05 on each (the street that is shipped: .05, the table: .05).
+/// share with disparity .7); these keep what few disparities say of the smallest, at a
+/// calibration error of .02 on all together and .02 to .05 on each (the street that is
+/// shipped: .05, the table: .05).
 const CERTAINTY: f32 = -2.5;
 const PER_AREA: f32 = 0.9;
 const PER_VALID: f32 = 4.2;

@@ -227,9 +227,9 @@ mod tests {
     }
 
     #[test]
-    fn a_third_of_a_short_row_is_cut_and_no_half() {
-        // Of ten pixels the image shows two, four and six further inward.
-        for (edge, expected) in [(12, 12), (14, 14), (16, 10)] {
+    fn two_fifths_of_a_short_row_are_cut_and_no_half() {
+        // Of ten pixels; an edge between two is seen from both, and the outer one is taken.
+        for (edge, expected) in [(12, 11), (15, 14), (16, 10)] {
             let gray = Image::from_fn(SIZE, |x, _| if x < edge { 40 } else { 200 });
             let left = View { gray, is_gray: true, ..View::default() };
             let disparity = Image::filled(SIZE, 10.0);
@@ -241,7 +241,7 @@ mod tests {
             }
             let trim = Trim { left: &left, disparity: &disparity, surface: 10.0 };
             trim.run(simd::detect(), 2, &mut out);
-            assert!(out.boxes[1].x0.abs_diff(expected) <= 1, "{:?}", out.boxes[1]);
+            assert_eq!(out.boxes[1].x0, expected, "{edge}");
         }
     }
 

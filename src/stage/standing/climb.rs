@@ -342,12 +342,17 @@ mod tests {
         out
     }
 
-    #[test]
-    fn what_is_hidden_below_is_so_across_a_few_missing_cells() {
+    /// The ground d = .3 v + b u + c, 1.7 m below the camera.
+    fn ground(b: f32, c: f32) -> Plane {
         let size = Size::new(640, 376);
         let camera = |tx| Camera::pinhole(size, 500.0, 320.0, 120.0, tx);
         let rig = StereoRig::new(camera(0.0), camera(-250.0), 0.0).unwrap();
-        let plane = Plane::new(0.3, 0.0, -36.0, &rig).unwrap();
+        Plane::new(0.3, b, c, &rig).unwrap()
+    }
+
+    #[test]
+    fn what_is_hidden_below_is_so_across_a_few_missing_cells() {
+        let plane = ground(0.0, -36.0);
         // Column by column a wider strip without disparity between a car and a trunk behind it.
         let map = Image::from_fn(Size::new(LANES, 94), |missing, y| match y {
             y if y + missing < 40 && y >= 16 => 12.0,
@@ -368,10 +373,7 @@ mod tests {
 
     #[test]
     fn the_segments_of_many_columns_are_those_of_each() {
-        let size = Size::new(640, 376);
-        let camera = |tx| Camera::pinhole(size, 500.0, 320.0, 120.0, tx);
-        let rig = StereoRig::new(camera(0.0), camera(-250.0), 0.0).unwrap();
-        let plane = Plane::new(0.3, 0.01, -40.0, &rig).unwrap();
+        let plane = ground(0.01, -40.0);
         let noise = |x: usize, y: usize, n: usize| (x * 31 + y * 17 + (x * y) % 13) % n;
         // Upright surfaces before each other on a ground, with holes and steps. The
         // columns are no whole number of vectors.

@@ -4,11 +4,11 @@ use crate::image::Image;
 use crate::simd::{Simd, f32x16, padded, prelude::*};
 
 /// Pixels to each side, above and below among which the nearest disparity is looked for:
-/// across more of them cars that stand close grow together.
+/// more of them gain nothing.
 const REACH: isize = 2;
 /// What a pixel of distance counts in levels of brightness, and how much a hole may
-/// differ from where its disparity comes from, the distance counted in: next to it by
-/// more than what one surface differs from pixel to pixel, farther away by that.
+/// differ from where its disparity comes from, the distance counted in: by 20 next to
+/// it, by 10 across a pixel. With twice as much fewer outlines on rendered streets are right.
 const PER_PX: f32 = 10.0;
 const MOST: f32 = 30.0;
 

@@ -15,7 +15,7 @@ const SURFACE_PART: f32 = 0.1;
 const SURFACE_PX: f32 = 0.7;
 /// By how much a disparity of a thing exceeds the ground's: pixels, and parts of its
 /// surface's. Around the foot of a thing the matcher carries its disparity on over the
-/// bare ground, and the nearer it is the farther.
+/// bare ground.
 const GROUND_PX: f32 = 0.3;
 const GROUND_PART: f32 = 0.02;
 
