@@ -2,7 +2,7 @@
 
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, store_inside, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, i32x16, padded, prelude::*, store_inside};
 use crate::stage::saliency::PreviousFrame;
 use crate::stage::saliency::flow::Flow;
 
@@ -26,8 +26,8 @@ pub struct Persistence {
     share: f32,
     threshold: Option<f32>,
     gain: Image<f32>,
-    /// Attention and mark of each cell of the frame before.
-    past: Vec<[f32; 2]>,
+    /// Attention of each cell of the frame before, its mark as the sign: see [`mark`].
+    past: Vec<f32>,
 }
 
 impl Persistence {
@@ -59,11 +59,10 @@ impl Persistence {
         self.gain.resize(attention.size());
         let kept = before.attended.size() == attention.size();
         let Self { level, share, gain, past, .. } = self;
-        past.resize(attention.size().area(), [0.0; 2]);
         // Without marks the first map stands in for them, and says nothing.
         let marks = if kept { &before.attended } else { &before.attention };
         dispatch!(*level, simd => {
-            pair(before.attention.pixels(), marks.pixels(), past);
+            mark(before.attention.pixels(), marks.pixels(), attention.width(), past);
             smooth(simd, attention, past, flow, *share, gain);
         });
         if !kept {
@@ -93,12 +92,17 @@ impl Persistence {
 /// Cells that are smoothed at once.
 const LANES: usize = 16;
 
-/// Puts the values of two maps side by side.
+/// Writes the values, which are not negative, those with a mark of 1 with the sign of
+/// negative ones: a place is fetched once for both maps. Behind them the last row of
+/// `width` cells once more, and one.
 #[inline(always)]
-fn pair(first: &[f32], second: &[f32], out: &mut [[f32; 2]]) {
-    for ((out, first), second) in out.iter_mut().zip(first).zip(second) {
-        *out = [*first, *second];
+fn mark(values: &[f32], marks: &[f32], width: usize, out: &mut Vec<f32>) {
+    out.resize(values.len() + width + 1, 0.0);
+    for ((out, value), mark) in out.iter_mut().zip(values).zip(marks) {
+        *out = f32::from_bits(value.to_bits() | u32::from(*mark != 0.0) << 31);
     }
+    let end = values.len();
+    out.copy_within(end - width..end, end);
 }
 
 /// Smooths the map, and fills what each cell gains.
@@ -106,19 +110,19 @@ fn pair(first: &[f32], second: &[f32], out: &mut [[f32; 2]]) {
 fn smooth<S: Simd>(
     simd: S,
     attention: &mut Image<f32>,
-    past: &[[f32; 2]],
+    past: &[f32],
     flow: &Flow,
     share: f32,
     gain: &mut Image<f32>,
 ) {
     let size = attention.size();
+    let lane = f32x16::from_fn(simd, |i| i as f32);
     for y in 0..size.height {
         for x in (0..size.width).step_by(LANES) {
             let dx: f32x16<S> = padded(simd, flow.dx.row(y), x, 0.0);
             let dy: f32x16<S> = padded(simd, flow.dy.row(y), x, 0.0);
             let trust: f32x16<S> = padded(simd, flow.trust.row(y), x, 0.0);
-            let here = f32x16::from_fn(simd, |i| (x + i) as f32);
-            let place = Place::new(size, here + dx, dy + y as f32);
+            let place = Place::new(size, lane + x as f32 + dx, dy + y as f32);
             let now: f32x16<S> = padded(simd, attention.row(y), x, 0.0);
             let [past, attended] = place.of(simd, past);
             let change = past - now;
@@ -132,7 +136,7 @@ fn smooth<S: Simd>(
 
 /// For each of several places the cell to its upper left, and its distance from that.
 struct Place<S: Simd> {
-    at: u32x16<S>,
+    at: [i32; LANES],
     width: usize,
     fx: f32x16<S>,
     fy: f32x16<S>,
@@ -145,19 +149,20 @@ impl<S: Simd> Place<S> {
         let x = x.max(0.0).min((width - 1) as f32);
         let y = y.max(0.0).min((height - 1) as f32);
         let (x0, y0) = (x.floor(), y.floor());
-        let (column, row): (u32x16<S>, u32x16<S>) = (x0.to_int(), y0.to_int());
-        Self { at: row * width as u32 + column, width, fx: x - x0, fy: y - y0 }
+        let (column, row): (i32x16<S>, i32x16<S>) = (x0.to_int(), y0.to_int());
+        let at = (row * width as i32 + column).to_array();
+        Self { at, width, fx: x - x0, fy: y - y0 }
     }
 
-    /// Bilinear values of two maps. The cells are fetched one place after the other; what
-    /// is right of the last column or below the last row has no share.
+    /// Bilinear values of the two maps that [`mark`] made one. The cells are fetched one place
+    /// after the other; what is right of the last column or below the last row has no share.
     #[inline(always)]
-    fn of(&self, simd: S, cells: &[[f32; 2]]) -> [f32x16<S>; 2] {
-        let [mut upper, mut lower] = [[[0.0; 4]; LANES]; 2];
-        for (i, at) in self.at.as_slice().iter().enumerate() {
-            let (at, below) = (*at as usize, *at as usize + self.width);
-            upper[i] = beside(cells, at);
-            lower[i] = if below < cells.len() { beside(cells, below) } else { upper[i] };
+    fn of(&self, simd: S, cells: &[f32]) -> [f32x16<S>; 2] {
+        let [mut upper, mut lower] = [[[0.0; 2]; LANES]; 2];
+        for ((at, upper), lower) in self.at.iter().zip(&mut upper).zip(&mut lower) {
+            let cells = &cells[*at as usize..][..self.width + 2];
+            *upper = [cells[0], cells[1]];
+            *lower = [cells[self.width], cells[self.width + 1]];
         }
         let upper = self.across(simd, &upper);
         let lower = self.across(simd, &lower);
@@ -167,26 +172,19 @@ impl<S: Simd> Place<S> {
 
     /// Of both maps between a cell and the next one.
     #[inline(always)]
-    fn across(&self, simd: S, cells: &[[f32; 4]; LANES]) -> [f32x16<S>; 2] {
-        let quarters = cells.as_flattened().as_chunks::<LANES>().0;
-        let mut parts = [f32x16::splat(simd, 0.0); 4];
-        for (part, quarter) in parts.iter_mut().zip(quarters) {
-            *part = f32x16::from_slice(simd, quarter);
-        }
-        let (left, right) = (parts[0].deinterleave(parts[1]), parts[2].deinterleave(parts[3]));
-        // The first map's cells and the next ones, by turns; the same of the second.
-        let (first, first_next) = left.0.deinterleave(right.0);
-        let (second, second_next) = left.1.deinterleave(right.1);
+    fn across(&self, simd: S, cells: &[[f32; 2]; LANES]) -> [f32x16<S>; 2] {
+        let (low, high) = cells.as_flattened().split_at(LANES);
+        let (low, high) = (f32x16::from_slice(simd, low), f32x16::from_slice(simd, high));
+        let (here, next) = low.deinterleave(high);
+        let (first, second) = (here.abs(), marked(simd, here));
+        let (first_next, second_next) = (next.abs(), marked(simd, next));
         [first + self.fx * (first_next - first), second + self.fx * (second_next - second)]
     }
 }
 
-/// A cell of two maps and the next one; twice the last one.
+/// 1 where the sign is that of negative ones.
 #[inline(always)]
-fn beside(cells: &[[f32; 2]], at: usize) -> [f32; 4] {
-    let [[a, b], [c, d]] = match cells[at..].first_chunk() {
-        Some(pair) => *pair,
-        None => [cells[at]; 2],
-    };
-    [a, b, c, d]
+fn marked<S: Simd>(simd: S, cells: f32x16<S>) -> f32x16<S> {
+    let bits: i32x16<S> = cells.bitcast();
+    bits.simd_lt(0).select(f32x16::splat(simd, 1.0), f32x16::splat(simd, 0.0))
 }
