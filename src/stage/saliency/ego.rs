@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, i32x16, prelude::*};
 use crate::stage::coarse::CELL;
 use crate::stage::saliency::AttentionScene;
 use crate::stage::saliency::flow::Flow;
@@ -61,7 +61,7 @@ pub struct EgoMotion {
     equations: Vec<Equations>,
     residuals: Vec<Lanes>,
     /// Bits of what a rank is asked of.
-    ranked: Vec<u32>,
+    ranked: Vec<i32>,
     blocks: Image<f32>,
     /// `C_M` per cell, 0..=1.
     pub motion: Image<f32>,
@@ -118,9 +118,9 @@ impl EgoMotion {
         }
         self.write_motion(flow, scene.cells.gray.size(), &found, spread);
         self.ranked.clear();
-        self.ranked.extend(self.blocks.pixels().iter().map(|motion| motion.to_bits()));
+        self.ranked.extend(self.blocks.pixels().iter().map(|motion| motion.to_bits() as i32));
         let rank = ((1.0 - MOVERS) * (self.ranked.len() - 1) as f32) as u32;
-        self.ranked.resize(self.ranked.len().next_multiple_of(LANES), u32::MAX);
+        self.ranked.resize(self.ranked.len().next_multiple_of(LANES), LAST);
         let ranked = self.ranked.as_chunks::<LANES>().0;
         let now = dispatch!(self.level, simd => ranked_at(simd, ranked, rank));
         self.most = now.max(held + (1.0 - HELD) * now);
@@ -219,7 +219,7 @@ impl EgoMotion {
                 residuals.store_slice(out);
                 let is_firm = f32x16::load_array_ref(simd, &e.firmness).simd_gt(FIRM);
                 // The others come behind all.
-                let last = u32x16::splat(simd, u32::MAX);
+                let last = i32x16::splat(simd, LAST);
                 is_firm.select(residuals.bitcast(), last).store_slice(ranked);
                 firm += is_firm.to_bitmask().count_ones();
             }
@@ -233,22 +233,25 @@ impl EgoMotion {
 /// their bits: those have the same order. Bit by bit it is asked how many are
 /// smaller, which takes less time than to sort them.
 #[inline(always)]
-fn ranked_at<S: Simd>(simd: S, values: &[[u32; LANES]], rank: u32) -> f32 {
-    let (none, one) = (u32x16::splat(simd, 0), u32x16::splat(simd, 1));
+fn ranked_at<S: Simd>(simd: S, values: &[[i32; LANES]], rank: u32) -> f32 {
+    let (none, one) = (i32x16::splat(simd, 0), i32x16::splat(simd, 1));
     let mut value = 0;
     for bit in (0..31).rev() {
         let above = value | 1 << bit;
         let mut smaller = none;
         for values in values {
-            let values = u32x16::load_array_ref(simd, values);
+            let values = i32x16::load_array_ref(simd, values);
             smaller += values.simd_lt(above).select(one, none);
         }
-        if smaller.as_slice().iter().sum::<u32>() <= rank {
+        if smaller.as_slice().iter().sum::<i32>() as u32 <= rank {
             value = above;
         }
     }
-    f32::from_bits(value)
+    f32::from_bits(value as u32)
 }
+
+/// What comes behind all values.
+const LAST: i32 = i32::MAX;
 
 /// In lanes: one sum would wait for itself.
 fn sum(values: &[f32]) -> f32 {
