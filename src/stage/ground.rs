@@ -326,7 +326,8 @@ fn level(p: Measured, q: Measured, rig: &StereoRig) -> Option<Plane> {
 #[inline]
 pub fn cell_centre(x: usize, y: usize) -> (f32, f32) {
     let half = (CELL as f32 - 1.0) / 2.0;
-    ((x * CELL) as f32 + half, (y * CELL) as f32 + half)
+    // Below AVX-512 there are no vectors of 64 bits that become floats.
+    ((x * CELL) as i32 as f32 + half, (y * CELL) as i32 as f32 + half)
 }
 
 /// Size of the map of cells of an image of `size`.
