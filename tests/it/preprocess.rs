@@ -124,6 +124,9 @@ fn area_resize_equals_the_mean_of_its_pixels() {
             assert_eq!(plain::channel(&quarter, c), expected, "{c}, {size}");
         }
         let gray = plain::channel(&rgb, 1);
+        let mut quarter = Image::new(up);
+        box_mean::<1, 4>(level, gray.pixels(), size.width, quarter.pixels_mut(), up.width);
+        assert_eq!(quarter, plain::box_mean(&gray, 4, up), "gray, {size}");
         box_mean::<1, 2>(level, gray.pixels(), size.width, half.pixels_mut(), down.width);
         assert_eq!(half, plain::box_mean(&gray, 2, down), "{size}");
     }

@@ -30,10 +30,38 @@ pub fn box_mean<const C: usize, const F: usize>(
     });
 }
 
+/// One row of cells from four rows of gray pixels. Four pixels side by side are one word,
+/// so that no sum runs across a vector.
+#[inline(always)]
+fn mean_of_four(band: &[u8], width: usize, out: &mut [u8]) {
+    const EVEN: u32 = 0x00ff_00ff;
+    let n = (width / 4).min(out.len());
+    let (whole, cut) = out.split_at_mut(n);
+    let words = |y: usize| &band[y * width..][..4 * n].as_chunks::<4>().0[..n];
+    let rows = [words(0), words(1), words(2), words(3)];
+    for (i, cell) in whole.iter_mut().enumerate() {
+        let mut sums = 0;
+        for row in rows {
+            let word = u32::from_le_bytes(row[i]);
+            sums += (word & EVEN) + (word >> 8 & EVEN);
+        }
+        *cell = (((sums & 0xffff) + (sums >> 16) + 8) / 16) as u8;
+    }
+    if let (Some(cell), count @ 1..) = (cut.first_mut(), 4 * (width - 4 * n) as u32) {
+        let ends = band.chunks_exact(width).flat_map(|row| &row[4 * n..]);
+        let sum: u32 = ends.map(|pixel| u32::from(*pixel)).sum();
+        *cell = ((sum + count / 2) / count) as u8;
+    }
+}
+
 /// One row of cells from up to `F` rows of pixels.
 #[inline(always)]
 fn mean_band<const C: usize, const F: usize>(band: &[u8], width: usize, out: &mut [u8]) {
     let height = band.len() / (width * C);
+    if C == 1 && F == 4 && height == F {
+        mean_of_four(band, width, out);
+        return;
+    }
     // Column sums first: they run along whole rows and vectorise.
     let mut sums = [0_u16; STRIP * 3];
     for x in (0..width).step_by(STRIP) {
