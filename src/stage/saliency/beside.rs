@@ -1,7 +1,7 @@
 //! Agreement with what is beside at the same depth.
 
 use crate::image::Image;
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, store_inside};
 
 /// Cells on either side.
 const REACH: usize = 3;
@@ -9,18 +9,23 @@ const REACH: usize = 3;
 const SAME_PX: f32 = 0.6;
 const SAME_PART: f32 = 0.08;
 
+/// Cells that are averaged at once.
+const LANES: usize = 16;
+
 /// Mean over a row's neighbours of the same depth, with its buffers.
 #[derive(Debug)]
 pub struct Beside {
     level: Level,
-    sum: Vec<f32>,
-    count: Vec<f32>,
+    /// One row of disparities and of values, with room for neighbours beyond its ends and
+    /// for a whole group: nothing is as deep as that.
+    disparity: Vec<f32>,
+    values: Vec<f32>,
 }
 
 impl Beside {
     /// The filter at this SIMD level.
     pub fn new(level: Level) -> Self {
-        Self { level, sum: Vec::new(), count: Vec::new() }
+        Self { level, disparity: Vec::new(), values: Vec::new() }
     }
 
     /// Replaces each value of `map` by its mean over the cells of its row up to
@@ -28,39 +33,39 @@ impl Beside {
     /// max(0.6 px, 8 %): a thing is one, and what is behind it is not of it.
     pub fn run(&mut self, disparity: &Image<f32>, map: &mut Image<f32>) {
         let width = map.width();
-        self.sum.resize(width, 0.0);
-        self.count.resize(width, 0.0);
-        let Self { level, sum, count } = self;
-        dispatch!(*level, _simd => {
+        let Self { level, disparity: depths, values } = self;
+        for buffer in [&mut *depths, &mut *values] {
+            buffer.clear();
+            buffer.resize(width + 2 * REACH + LANES, f32::NAN);
+        }
+        dispatch!(*level, simd => {
             for y in 0..map.height() {
-                average(disparity.row(y), map.row_mut(y), &mut sum[..width], &mut count[..width]);
+                depths[REACH..REACH + width].copy_from_slice(disparity.row(y));
+                values[REACH..REACH + width].copy_from_slice(map.row(y));
+                for x in (0..width).step_by(LANES) {
+                    store_inside(map.row_mut(y), x, average(simd, &depths[x..], &values[x..]));
+                }
             }
         });
     }
 }
 
+/// The means of cells, which begin [`REACH`] places from the start.
 #[inline(always)]
-fn average(disparity: &[f32], row: &mut [f32], sum: &mut [f32], count: &mut [f32]) {
-    let width = row.len();
-    sum.copy_from_slice(row);
-    count.fill(1.0);
-    for step in 1..=REACH.min(width.saturating_sub(1)) {
-        let n = width - step;
-        add(&disparity[..n], &disparity[step..], &row[step..], &mut sum[..n], &mut count[..n]);
-        add(&disparity[step..], &disparity[..n], &row[..n], &mut sum[step..], &mut count[step..]);
+fn average<S: Simd>(simd: S, disparity: &[f32], values: &[f32]) -> f32x16<S> {
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let here = f32x16::from_slice(simd, &disparity[REACH..REACH + LANES]);
+    let most = (here * SAME_PART).max(SAME_PX);
+    let mut sum = f32x16::from_slice(simd, &values[REACH..REACH + LANES]);
+    let mut count = one;
+    for step in 1..=REACH {
+        for at in [REACH + step, REACH - step] {
+            let there = f32x16::from_slice(simd, &disparity[at..at + LANES]);
+            let same = (there - here).abs().simd_le(most);
+            let values = f32x16::from_slice(simd, &values[at..at + LANES]);
+            sum += same.select(values, zero);
+            count += same.select(one, zero);
+        }
     }
-    for ((value, sum), count) in row.iter_mut().zip(sum).zip(count) {
-        *value = *sum / *count;
-    }
-}
-
-/// Adds the neighbours that are as deep.
-#[inline(always)]
-fn add(here: &[f32], there: &[f32], values: &[f32], sum: &mut [f32], count: &mut [f32]) {
-    let cells = here.iter().zip(there).zip(values).zip(sum).zip(count);
-    for ((((&here, &there), &value), sum), count) in cells {
-        let same = (there - here).abs() <= (SAME_PART * here).max(SAME_PX);
-        *sum += if same { value } else { 0.0 };
-        *count += if same { 1.0 } else { 0.0 };
-    }
+    sum / count
 }

@@ -108,7 +108,8 @@ impl SceneSaliency {
 
     /// Writes S per cell, after [`SceneSaliency::prepare`].
     pub fn run(&mut self, scene: &AttentionScene<'_>, out: &mut Image<f32>) {
-        let measured = scene.coarse.checked.pixels().iter().filter(|d| **d >= 1.0).count();
+        let checked = scene.coarse.checked.pixels();
+        let measured = dispatch!(self.level, _simd => count_measured(checked));
         let has_depth = measured as f32 >= LEAST_MEASURED * out.size().area() as f32;
         let motion = match scene.flow {
             Some(flow) if self.ego.run(flow, scene, has_depth) => Some(&self.ego),
@@ -134,6 +135,12 @@ impl SceneSaliency {
         let out = self.fourth.pixels_mut();
         dispatch!(self.level, simd => scale_to_bytes(simd, filled.pixels(), out));
     }
+}
+
+/// How many disparities are at least one pixel.
+#[inline(always)]
+fn count_measured(disparity: &[f32]) -> u32 {
+    disparity.iter().map(|d| u32::from(*d >= 1.0)).sum()
 }
 
 #[inline(always)]
