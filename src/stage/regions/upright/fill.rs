@@ -1,11 +1,11 @@
 //! Holes of the disparity, filled by what looks alike beside them.
 
-use crate::image::Image;
+use crate::image::{Image, Size};
 use crate::simd::{Simd, f32x16, padded, prelude::*};
 
 /// Pixels to each side, above and below among which the nearest disparity is looked for:
 /// more of them gain nothing.
-const REACH: isize = 2;
+const REACH: usize = 2;
 /// What a pixel of distance counts in levels of brightness, and how much a hole may
 /// differ from where its disparity comes from, the distance counted in: by 20 next to
 /// it, by 10 across a pixel. With twice as much fewer outlines on rendered streets are right.
@@ -29,27 +29,103 @@ pub fn fill<S: Simd>(
     gray: &Image<u8>,
     (x, y): (usize, usize),
 ) -> f32x16<S> {
-    let here = brightness(simd, gray.row(y), x, 0);
-    let none = f32x16::splat(simd, f32::NAN);
-    let (mut least, mut found) = (f32x16::splat(simd, f32::INFINITY), none);
-    for (across, down) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
-        let (mut unlike, mut nearest) = (least, none);
-        // What is nearer is written over what is farther.
-        for step in (1..=REACH).rev() {
-            let row = y.checked_add_signed(step * down).filter(|row| *row < disparity.height());
-            let Some(row) = row else { continue };
-            let other = shifted(simd, disparity.row(row), x, step * across);
-            let change = (brightness(simd, gray.row(row), x, step * across) - here).abs();
-            let known = other.simd_eq(other);
-            unlike = known.select(change + PER_PX * step as f32, unlike);
-            nearest = known.select(other, nearest);
+    let Size { width, height } = disparity.size();
+    let mut best = Best {
+        here: brightness(simd, gray.row(y), x, 0),
+        // Between whole numbers: as good as this is nothing.
+        least: f32x16::splat(simd, MOST + 0.5),
+        found: f32x16::splat(simd, f32::NAN),
+    };
+    let inside = x >= REACH
+        && x + LANES + REACH <= width
+        && (REACH..height.saturating_sub(REACH)).contains(&y);
+    if inside {
+        // Nearly all of them: nothing is asked of each of the eight.
+        let (row, look) = (disparity.row(y), gray.row(y));
+        best.weigh(&Look::at(simd, row, look, x - 1), &Look::at(simd, row, look, x - 2));
+        best.weigh(&Look::at(simd, row, look, x + 1), &Look::at(simd, row, look, x + 2));
+        let near = Look::at(simd, disparity.row(y - 1), gray.row(y - 1), x);
+        best.weigh(&near, &Look::at(simd, disparity.row(y - 2), gray.row(y - 2), x));
+        let near = Look::at(simd, disparity.row(y + 1), gray.row(y + 1), x);
+        best.weigh(&near, &Look::at(simd, disparity.row(y + 2), gray.row(y + 2), x));
+    } else {
+        for (across, down) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+            let near = Look::near_edge(simd, disparity, gray, (x, y), (across, down));
+            let far = Look::near_edge(simd, disparity, gray, (x, y), (2 * across, 2 * down));
+            best.weigh(&near, &far);
         }
-        let better = unlike.simd_lt(least) | (unlike.simd_eq(least) & nearest.simd_lt(found));
-        let better = better & unlike.simd_le(MOST) & nearest.simd_eq(nearest);
-        least = better.select(unlike, least);
-        found = better.select(nearest, found);
     }
-    found
+    best.found
+}
+
+/// What is to one side of pixels at one distance.
+struct Look<S: Simd> {
+    disparity: f32x16<S>,
+    brightness: f32x16<S>,
+}
+
+impl<S: Simd> Look<S> {
+    /// In a row of both, from column `x` on, all of it inside.
+    #[inline(always)]
+    fn at(simd: S, disparity: &[f32], gray: &[u8], x: usize) -> Self {
+        Self {
+            disparity: f32x16::from_slice(simd, &disparity[x..x + LANES]),
+            brightness: brightness(simd, &gray[x..x + LANES], 0, 0),
+        }
+    }
+
+    /// The same `across` and `down` from `(x, y)`, wherever that is.
+    #[inline(always)]
+    fn near_edge(
+        simd: S,
+        disparity: &Image<f32>,
+        gray: &Image<u8>,
+        (x, y): (usize, usize),
+        (across, down): (isize, isize),
+    ) -> Self {
+        let (mut row, mut look) = (&[][..], &[][..]);
+        if let Some(y) = y.checked_add_signed(down)
+            && y < disparity.height()
+        {
+            (row, look) = (disparity.row(y), gray.row(y));
+        }
+        Self {
+            disparity: shifted(simd, row, x, across),
+            brightness: brightness(simd, look, x, across),
+        }
+    }
+
+    /// How unlike that is, `px` away, what looks like `here`.
+    #[inline(always)]
+    fn unlike(&self, here: f32x16<S>, px: f32) -> f32x16<S> {
+        (self.brightness - here).abs() + PER_PX * px
+    }
+}
+
+/// What pixels take.
+struct Best<S: Simd> {
+    here: f32x16<S>,
+    /// How unlike that is.
+    least: f32x16<S>,
+    found: f32x16<S>,
+}
+
+impl<S: Simd> Best<S> {
+    /// Takes the nearest disparity to one side into account, of pixels next to these and of
+    /// those behind them.
+    #[inline(always)]
+    fn weigh(&mut self, near: &Look<S>, far: &Look<S>) {
+        let never = f32x16::splat(self.here.simd, f32::INFINITY);
+        let is_far = far.disparity.simd_eq(far.disparity);
+        let behind = is_far.select(far.unlike(self.here, 2.0), never);
+        let is_near = near.disparity.simd_eq(near.disparity);
+        let unlike = is_near.select(near.unlike(self.here, 1.0), behind);
+        let nearest = is_near.select(near.disparity, far.disparity);
+        let better =
+            unlike.simd_lt(self.least) | (unlike.simd_eq(self.least) & nearest.simd_lt(self.found));
+        self.least = better.select(unlike, self.least);
+        self.found = better.select(nearest, self.found);
+    }
 }
 
 /// The values `by` columns beside those from column `x` on; NaN beyond the row.
@@ -86,7 +162,6 @@ fn brightness<S: Simd>(simd: S, row: &[u8], x: usize, by: isize) -> f32x16<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Size;
     use crate::simd::{self, dispatch};
 
     /// Holds every pixel of every group of sixteen, from every column on, against `plain`.

@@ -203,10 +203,15 @@ impl Painter {
                 // What the ground's disparity is raised by, with its constant part.
                 let rise = surface * GROUND_PART + (plane.c + GROUND_PX);
                 let (mut seen, mut seen_rows, mut area) = (0, 0_u64, 0);
-                for y in rows.clone() {
+                // All rows at once: nobody foresees the holes, on which more depends.
+                let mut found = [f32x16::splat(simd, f32::NAN); HIGH];
+                for (i, y) in rows.clone().enumerate() {
+                    found[i] = padded(simd, source.disparity.row(y), x, f32::NAN);
+                }
+                for (i, y) in rows.clone().enumerate() {
+                    let mut d = found[i];
                     // What does not rise above the ground is none of the thing.
                     let ground = slope + plane.a * y as f32 + rise;
-                    let mut d: f32x16<S> = padded(simd, source.disparity.row(y), x, f32::NAN);
                     // Those inside of a thing are its own anyway.
                     let open = !d.simd_eq(d).to_bitmask() & all & !inside;
                     if open != 0 {

@@ -54,26 +54,33 @@ struct Row<'a> {
 impl Row<'_> {
     #[inline(always)]
     fn shrink<S: Simd>(&self, simd: S, map: &mut [f32], fine: &mut [u64]) {
-        for (i, map) in map.chunks_mut(LANES).enumerate() {
-            let x = i * PIXELS;
-            // What was not matched finely is known coarsely.
-            let coarse: f32x16<S> = padded(simd, self.coarse, i * COARSE, f32::NAN);
-            let coarse = coarse - self.offset;
-            let mut values = coarse.zip_low(coarse);
-            let [upper, lower] = self.matched;
-            let matched = cells_of(upper, lower, x);
-            if matched != 0 {
-                let medians = medians_of(simd, &self.disparity, x);
-                let known = medians.simd_eq(medians).to_bitmask() & matched;
-                values = mask32x16::from_bitmask(simd, known).select(medians, values);
-                fine[i * LANES / 64] |= known << (i * LANES % 64);
-            }
-            if map.len() == LANES {
-                values.store_slice(map);
-            } else {
-                map.copy_from_slice(&values.as_slice()[..map.len()]);
-            }
+        let (groups, rest) = map.as_chunks_mut::<LANES>();
+        let whole = groups.len();
+        for (i, group) in groups.iter_mut().enumerate() {
+            self.cells(simd, i, fine).store_array(group);
         }
+        if !rest.is_empty() {
+            rest.copy_from_slice(&self.cells(simd, whole, fine).as_slice()[..rest.len()]);
+        }
+    }
+
+    /// The cells of group `i`, whose bits in `fine` are set.
+    #[inline(always)]
+    fn cells<S: Simd>(&self, simd: S, i: usize, fine: &mut [u64]) -> f32x16<S> {
+        let x = i * PIXELS;
+        // What was not matched finely is known coarsely.
+        let coarse: f32x16<S> = padded(simd, self.coarse, i * COARSE, f32::NAN);
+        let coarse = coarse - self.offset;
+        let mut values = coarse.zip_low(coarse);
+        let [upper, lower] = self.matched;
+        let matched = cells_of(upper, lower, x);
+        if matched != 0 {
+            let medians = medians_of(simd, &self.disparity, x);
+            let known = medians.simd_eq(medians).to_bitmask() & matched;
+            values = mask32x16::from_bitmask(simd, known).select(medians, values);
+            fine[i * LANES / 64] |= known << (i * LANES % 64);
+        }
+        values
     }
 }
 
