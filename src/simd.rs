@@ -7,8 +7,8 @@
 
 pub use fearless_simd::prelude;
 pub use fearless_simd::{
-    Level, Simd, dispatch, f32x16, f64x8, i16x16, i32x16, mask8x64, mask16x16, mask32x16, mask64x8,
-    u8x16, u8x32, u8x64, u16x16, u32x16, u64x8,
+    Level, Simd, dispatch, f32x16, f64x8, i16x16, i32x16, mask8x16, mask8x64, mask16x16, mask32x16,
+    mask64x8, u8x16, u8x32, u8x64, u16x16, u32x16, u64x8,
 };
 
 use fearless_simd::prelude::*;

@@ -250,20 +250,41 @@ fn mean_and_deviation([sum, squares]: [f64; 2], n: f64) -> (f64, f64) {
 
 /// Ascending percentiles, each interpolated between its two neighbours; NaN
 /// when there is no value. Values are given by their bits and are positive. Reorders
-/// them, in linear time.
+/// them, in linear time: the middle percentile parts them first, so that each of the
+/// others is looked for among half of them or fewer.
 fn percentiles<const N: usize>(values: &mut [u32], parts: [f32; N]) -> [f32; N] {
-    let mut from = 0;
-    parts.map(|part| {
-        if values.is_empty() {
-            return f32::NAN;
-        }
-        let rank = part * (values.len() - 1) as f32;
-        let index = (rank as usize).min(values.len() - 1).max(from);
-        // What lies before `from` is already no larger than the rest.
-        let (_, low, rest) = values[from..].select_nth_unstable(index - from);
-        let high = f32::from_bits(rest.iter().copied().min().unwrap_or(*low));
-        let low = f32::from_bits(*low);
-        from = index;
-        low + (high - low) * (rank - index as f32)
+    let Some(last) = values.len().checked_sub(1) else { return [f32::NAN; N] };
+    let ranks = parts.map(|part| part * last as f32);
+    let places = ranks.map(|rank| (rank as usize).min(last));
+    let middle = N / 2;
+    // The values at a place and at the next one.
+    let mut found = [[0; 2]; N];
+    found[middle] = pair_at(values, places[middle], None);
+    for i in (0..middle).rev() {
+        let end = places[i + 1];
+        found[i] = if places[i] == end {
+            found[i + 1]
+        } else {
+            pair_at(&mut values[..end], places[i], Some(found[i + 1][0]))
+        };
+    }
+    for i in middle + 1..N {
+        let before = places[i - 1];
+        found[i] = if places[i] == before {
+            found[i - 1]
+        } else {
+            pair_at(&mut values[before + 1..], places[i] - before - 1, None)
+        };
+    }
+    std::array::from_fn(|i| {
+        let [low, high] = found[i].map(f32::from_bits);
+        low + (high - low) * (ranks[i] - places[i] as f32)
     })
+}
+
+/// The value that comes to `place` when they are in order, and the one behind it: `next`
+/// after the last one, or itself once more.
+fn pair_at(values: &mut [u32], place: usize, next: Option<u32>) -> [u32; 2] {
+    let (_, low, rest) = values.select_nth_unstable(place);
+    [*low, rest.iter().copied().min().or(next).unwrap_or(*low)]
 }

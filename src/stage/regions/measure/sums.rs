@@ -1,7 +1,7 @@
 //! Sums over the pixels of one region, sixteen at a time.
 
 use crate::image::Image;
-use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, mask8x16, padded, prelude::*, u8x16, u32x16};
 use crate::stage::coarse::CELL;
 use crate::stage::depth::Depth;
 use crate::stage::regions::RegionSource;
@@ -119,6 +119,7 @@ impl Sums {
     ) {
         let zero = f32x16::splat(simd, 0.0);
         let own = u32x16::splat(simd, id);
+        let (set, unset) = (u8x16::splat(simd, 255), u8x16::splat(simd, 0));
         let [mut sum, mut most] = [zero; 2];
         let mut area = 0;
         let cells = rows.x0 / CELL..rows.x1.div_ceil(CELL);
@@ -129,17 +130,16 @@ impl Sums {
             for (x, mask) in (rows.x0..).step_by(LANES).zip(mask.chunks_mut(LANES)) {
                 // Beyond the box there is no pixel of this id.
                 let at: u32x16<S> = padded(simd, ids, x, 0);
+                let inside = at.simd_eq(own);
+                let bits = inside.to_bitmask();
+                area += bits.count_ones();
                 if let Some(mask) = mask.first_chunk_mut::<LANES>() {
-                    for (mask, at) in mask.iter_mut().zip(at.as_array()) {
-                        *mask = if *at == id { 255 } else { 0 };
-                    }
+                    mask8x16::from_bitmask(simd, bits).select(set, unset).store_array(mask);
                 } else {
-                    for (mask, at) in mask.iter_mut().zip(at.as_slice()) {
-                        *mask = if *at == id { 255 } else { 0 };
+                    for (i, mask) in mask.iter_mut().enumerate() {
+                        *mask = if bits >> i & 1 == 1 { 255 } else { 0 };
                     }
                 }
-                let inside = at.simd_eq(own);
-                area += inside.to_bitmask().count_ones();
                 let s = inside.select(padded(simd, row, x, 0.0), zero);
                 sum += s;
                 most = most.max(s);
