@@ -304,13 +304,11 @@ impl Views<'_> {
             let y = region.y as usize + dy;
             let disparity = &self.disparity.row(y)[x..x + width];
             let labels = &self.labels.row(y)[x..x + width];
-            for ((&d, &label), _) in
-                disparity.iter().zip(labels).zip(mask).filter(|(_, mask)| **mask != 0)
-            {
-                // NaN is neither.
+            for ((&d, &label), &mask) in disparity.iter().zip(labels).zip(mask) {
+                // NaN is neither. The mask is no branch, which nobody could foresee.
                 let hidden = d > expected + tolerance;
                 let there = label == 0 && d >= expected - tolerance;
-                supported += u32::from(hidden || there);
+                supported += u32::from(hidden || there) & u32::from(mask != 0);
             }
         }
         supported as f32 >= LEAST_FOR * region.area as f32
