@@ -210,3 +210,10 @@ fn parked_cars_are_two_and_the_house_behind_them_is_none() {
     let nearest: Vec<_> = things.list.iter().map(|t| t.depth_m[0].round()).collect();
     assert_eq!(nearest, [12.0, 6.0]);
 }
+
+#[test]
+fn what_goes_on_upward_is_a_trunk_or_a_part_of_a_building() {
+    let tall = |wide: f64| things(&upright(&[[-wide / 2.0, wide / 2.0, 0.0, 6.0, 10.0]])).list;
+    assert_eq!(tall(1.5).len(), 1);
+    assert_eq!(tall(1.9).len(), 0);
+}

@@ -7,7 +7,7 @@ use super::join::View;
 /// Share of its columns from which a thing that goes on upward is part of a
 /// building, if it is wider than a trunk or a pole, metres.
 const MOST_TALL: f32 = 0.45;
-const TRUNK_M: f32 = 1.2;
+const TRUNK_M: f32 = 1.7;
 /// A thing reaches at least this height, metres (of a road scene).
 const LEAST_TOP_M: f32 = 0.35;
 /// and this part of its length: a bank of earth or a kerb is lower.
