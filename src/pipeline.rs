@@ -7,6 +7,7 @@ use crate::simd::Level;
 use crate::stage::coarse::{Coarse, CoarseDisparity};
 use crate::stage::depth::Depth;
 use crate::stage::ground::Footing;
+use crate::stage::pole::Poles;
 use crate::stage::preprocess::Preprocess;
 use crate::stage::refine::Refine;
 use crate::stage::regions::{RegionSource, Regions};
@@ -28,6 +29,7 @@ pub struct Pipeline {
     saliency: Saliency,
     roi: Roi,
     stereo: Stereo,
+    poles: Poles,
     refine: Refine,
     depth: Depth,
     regions: Regions,
@@ -55,6 +57,7 @@ impl Pipeline {
             saliency: Saliency::new(config, size, level),
             roi: Roi::new(config, size, level),
             stereo: Stereo::new(config, size, level),
+            poles: Poles::new(config, level),
             refine: Refine::new(config, size),
             depth: Depth::new(config),
             regions: Regions::new(config, size, level),
@@ -158,6 +161,10 @@ impl Pipeline {
             &self.coarse_disparity,
             &mut self.matches,
         );
+        let plane = footing.ground().filter(|_| self.roi.follows_attention());
+        self.poles.find(&out.left, &self.right, &out.rig, plane);
+        self.roi.include(self.poles.list(), &mut out.roi);
+        self.poles.raise(&mut out.attention, out.left.gray.width());
         lap.mark(&mut out.times, Stage::Stereo);
 
         self.refine.run(
@@ -168,6 +175,7 @@ impl Pipeline {
             &mut out.disparity,
             &mut out.confidence,
         );
+        self.poles.paint(&out.roi.matched, &mut out.disparity, &mut out.confidence);
         lap.mark(&mut out.times, Stage::Refine);
 
         self.depth.run(&out.disparity, &out.rig, &mut out.depth);
@@ -182,6 +190,7 @@ impl Pipeline {
             confidence: &out.confidence,
             rig: &out.rig,
             plane: footing.ground(),
+            poles: self.poles.list(),
             table: footing.table(),
         };
         self.regions.run(&source, &mut out.labels, &mut out.regions, &mut out.rejections);

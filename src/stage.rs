@@ -4,6 +4,7 @@ pub mod coarse;
 pub mod depth;
 pub mod ground;
 mod per_thread;
+pub mod pole;
 pub mod preprocess;
 pub mod refine;
 pub mod regions;

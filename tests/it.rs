@@ -33,6 +33,7 @@ mod it {
     mod picture;
     #[cfg(feature = "tool")]
     mod pipeline;
+    mod pole;
     mod preprocess;
     mod reference;
     mod regions;

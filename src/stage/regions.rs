@@ -25,6 +25,7 @@ use crate::simd::{Level, Simd, dispatch, mask16x16, prelude::*, u8x16, u16x16};
 use crate::stage::coarse::CoarseDisparity;
 use crate::stage::depth::Depth;
 use crate::stage::ground::Plane;
+use crate::stage::pole::Pole;
 use crate::stage::roi::Masks;
 use candidates::Candidates;
 use components::Components;
@@ -81,6 +82,8 @@ pub struct RegionSource<'a> {
     /// The ground, where one is known: what stands on it becomes a region.
     /// Without it, connected pixels of one depth do.
     pub plane: Option<&'a Plane>,
+    /// Poles on the ground.
+    pub poles: &'a [Pole],
     /// A plane that is looked down upon: what stands off it becomes a region.
     pub table: Option<&'a Plane>,
 }

@@ -13,6 +13,7 @@ use crate::image::{Image, Size};
 use crate::perception::RoiMask;
 use crate::simd::Level;
 use crate::stage::coarse::CoarseDisparity;
+use crate::stage::pole::Pole;
 
 use bits::BitMask;
 use budget::Budget;
@@ -93,6 +94,43 @@ impl Roi {
         self.allowance = fraction;
     }
 
+    /// Whether the mask is made from attention, not given.
+    pub const fn follows_attention(&self) -> bool {
+        self.rectangle.is_none() && !self.full_frame
+    }
+
+    /// Adds `poles` to both masks of the last run, which are matched as whole lines, as long
+    /// as `roi.max_fraction` and the allowance have room for them.
+    pub fn include(&mut self, poles: &[Pole], out: &mut RoiMask) {
+        let limit = self.limit();
+        let width = self.size.width;
+        for pole in poles {
+            let spans = || pole.rows.clone().map(|y| (y, pole.columns(y, width)));
+            let new: usize = spans()
+                .map(|(y, columns)| columns.filter(|x| out.matched.get(*x, y) == 0).count())
+                .sum();
+            if self.area + new > limit {
+                break;
+            }
+            self.area += new;
+            for (y, columns) in spans() {
+                for (mask, image) in [
+                    (&mut self.masks.salient, &mut out.salient),
+                    (&mut self.masks.matched, &mut out.matched),
+                ] {
+                    mask.set_rectangle((columns.start, columns.end), (y, y + 1));
+                    image.row_mut(y)[columns.clone()].fill(255);
+                }
+            }
+        }
+        out.fraction = self.area as f32 / self.size.area().max(1) as f32;
+    }
+
+    /// Pixels that may be matched.
+    fn limit(&self) -> usize {
+        (self.max_fraction.min(self.allowance) * self.size.area() as f64) as usize
+    }
+
     /// The masks of the last run.
     pub const fn masks(&self) -> &Masks {
         &self.masks
@@ -166,7 +204,7 @@ impl Roi {
     }
 
     fn keep_budget(&mut self, attention: &Image<f32>) {
-        let limit = (self.max_fraction.min(self.allowance) * self.size.area() as f64) as usize;
+        let limit = self.limit();
         if self.area > limit {
             self.budget.choose(&self.masks.matched, attention, limit);
             self.budget.apply(&mut self.masks.matched);

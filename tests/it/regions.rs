@@ -324,6 +324,7 @@ impl Boxes {
             confidence: &self.confidence,
             rig,
             plane: None,
+            poles: &[],
             table: None,
         }
     }
@@ -560,6 +561,7 @@ fn a_hole_at_the_rim_of_what_stands_belongs_to_what_it_looks_like() {
                 confidence: &confidence,
                 rig: &rig,
                 plane: Some(&plane),
+                poles: &[],
                 table: None,
             };
             let mut out = (Image::default(), RegionList::default(), Rejections::default());

@@ -220,6 +220,7 @@ fn regions_on(plane: &Plane, disparity: &Image<f32>) -> (RegionList, Rejections)
         confidence: &Image::filled(SIZE, 0.9),
         rig: &rig,
         plane: None,
+        poles: &[],
         table: Some(plane),
     };
     let mut out = (RegionList::default(), Rejections::default());

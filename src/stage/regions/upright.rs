@@ -1,5 +1,6 @@
 //! Regions of things that stand on the ground, from the fine disparity.
 
+mod adopt;
 mod fill;
 mod paint;
 mod post;
@@ -17,6 +18,7 @@ use crate::simd::{Level, dispatch};
 use crate::stage::ground::Plane;
 use crate::stage::roi::bits::{BitMask, bits_from, even_bits, first_set, last_set};
 use crate::stage::standing::{HIGH, Standing, Things, WIDE, size_scale};
+use adopt::adopt;
 use paint::Painter;
 use post::{Posts, Stump};
 use shrink::shrink;
@@ -77,6 +79,7 @@ impl Upright {
         self.painter.run(plane, source, (&self.things, &self.fine), count, out);
         self.trim(plane, source, out);
         self.follow(plane, source, out);
+        adopt(source.poles, out);
         rejections.floating = self.things.floating;
         rejections.background = self.things.background;
         rejections.not_salient = (self.things.list.len() - count) as u32;
