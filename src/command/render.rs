@@ -25,6 +25,9 @@ pub struct RenderArgs {
     /// Width of the pictures in pixels; the height follows
     #[arg(long, value_name = "PIXELS")]
     pub width: Option<usize>,
+    /// Another street: other cars, people, posts and trees in other places
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
 }
 
 /// Why no bag was made.
@@ -59,6 +62,7 @@ pub fn run(args: &RenderArgs) -> Result<(), RenderError> {
         let Size { width: w, height: h } = options.size;
         options.size = Size::new(width, width.saturating_mul(h) / w);
     }
+    options.seed = args.seed;
     let scene = SyntheticScene::new(args.scene, options)?;
     let mut bag = SceneBag::create(&args.output)?;
     // Hidden when stderr is no terminal.

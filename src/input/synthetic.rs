@@ -42,6 +42,7 @@ use part::Pose;
 use renderer::{Exposure, Geometry, Renderer};
 use sensor::Sensor;
 use shape::Vec3;
+use street::Variation;
 use viewpoint::Viewpoint;
 use world::World;
 
@@ -110,7 +111,7 @@ impl SceneKind {
             Self::Street => (Size::new(640, 240), 60),
             Self::Tabletop => (Size::new(480, 360), 30),
         };
-        SceneOptions { size, frames, rate_hz: 10.0, samples: 2, noise: true }
+        SceneOptions { size, frames, rate_hz: 10.0, samples: 2, noise: true, seed: 0 }
     }
 
     /// Focal length over picture width, baseline in metres, height of the
@@ -122,9 +123,9 @@ impl SceneKind {
         }
     }
 
-    fn compose(self, time: f64) -> World {
+    fn compose(self, time: f64, seed: u32) -> World {
         match self {
-            Self::Street => street::compose(time),
+            Self::Street => street::compose(time, Variation(seed)),
             Self::Tabletop => tabletop::compose(time),
         }
     }
@@ -160,6 +161,9 @@ pub struct SceneOptions {
     pub samples: usize,
     /// Sensor noise, and a right camera a little darker than the left one.
     pub noise: bool,
+    /// Of the street: which one. 0 is the shipped one; in others cars, people, posts and trees
+    /// are others and elsewhere.
+    pub seed: u32,
 }
 
 /// One of the two views.
@@ -186,7 +190,7 @@ impl SyntheticScene {
     /// # Errors
     /// When an option is out of range.
     pub fn new(kind: SceneKind, options: SceneOptions) -> Result<Self, SyntheticError> {
-        let SceneOptions { size, frames, rate_hz, samples, .. } = options;
+        let SceneOptions { size, frames, rate_hz, samples, seed, .. } = options;
         if !(32..=8192).contains(&size.width) || !(32..=8192).contains(&size.height) {
             return Err(SyntheticError::Size { size });
         }
@@ -204,6 +208,9 @@ impl SyntheticScene {
         }
         if !(1..=8).contains(&samples) {
             return out_of_range("samples per axis", samples.to_string(), "1 to 8");
+        }
+        if kind == SceneKind::Tabletop && seed != 0 {
+            return out_of_range("seed of the tabletop", seed.to_string(), "0: there is only one");
         }
         let (focal_share, baseline, middle) = kind.rig();
         let f = focal_share * size.width as f64;
@@ -238,7 +245,7 @@ impl SyntheticScene {
     }
 
     fn world(&self, index: usize) -> World {
-        self.kind.compose(index as f64 / self.options.rate_hz)
+        self.kind.compose(index as f64 / self.options.rate_hz, self.options.seed)
     }
 
     fn viewpoint(&self, world: &World, side: Side) -> Viewpoint {

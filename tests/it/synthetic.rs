@@ -206,6 +206,30 @@ fn the_number_of_threads_changes_nothing() {
 }
 
 #[test]
+fn every_seed_is_a_street_of_its_own() {
+    let street = |seed| {
+        let size = Size::new(160, 60);
+        let options = SceneOptions { size, seed, ..SceneKind::Street.defaults() };
+        let truth = SyntheticScene::new(SceneKind::Street, options).unwrap().truth(20, Side::Left);
+        maps(truth).1.pixels().to_vec()
+    };
+    let streets = [0, 1, 2, u32::MAX].map(street);
+    for (i, one) in streets.iter().enumerate() {
+        for other in &streets[..i] {
+            let differ = one.iter().zip(other).filter(|(a, b)| a != b).count();
+            assert!(differ > 160, "{differ} pixels");
+        }
+        // As many things, all of them named alike.
+        assert!(one.iter().all(|id| *id <= 46));
+        assert!((5..46).filter(|id| one.contains(id)).count() > 15);
+    }
+    assert_eq!(street(1), streets[1]);
+    let options = SceneOptions { seed: 1, ..SceneKind::Tabletop.defaults() };
+    let error = SyntheticScene::new(SceneKind::Tabletop, options).unwrap_err();
+    assert_eq!(error.to_string(), "seed of the tabletop is 1, allowed is 0: there is only one");
+}
+
+#[test]
 fn a_source_delivers_every_frame_once_and_in_order() {
     let options = SceneOptions {
         size: Size::new(96, 64),

@@ -5,6 +5,7 @@ mod car;
 mod furniture;
 mod houses;
 mod person;
+mod variation;
 
 use super::finish::rgb;
 use super::grid::Stage;
@@ -16,6 +17,7 @@ use super::world::{Backdrop, Lighting, World, camera_pose};
 use car::{CarPlace, Model, car};
 use furniture::{bollard, hedge, lamp_post, sign_post, tree};
 use person::{Walker, walker};
+pub use variation::Variation;
 
 /// Height of the pavement over the road in metres.
 const STEP: f64 = 0.12;
@@ -30,31 +32,44 @@ fn driven(time: f64) -> f64 {
     6.0 * time - 0.25 * time * time
 }
 
-/// The street at `time` seconds.
-pub fn compose(time: f64) -> World {
+/// What cars are painted with.
+const PAINTS: [u32; 13] = [
+    0x8C_92_98, 0x1E_5C_58, 0xC8_8A_20, 0xD8_D8_D4, 0x5A_16_22, 0x3A_5A_98, 0x22_24_28, 0x5A_76_8C,
+    0x1C_1E_22, 0xC2_6A_1E, 0x9A_A2_A6, 0x34_5A_3A, 0xA0_22_22,
+];
+
+/// One of the streets at `time` seconds.
+pub fn compose(time: f64, variation: Variation) -> World {
     let mut parts = ground();
     houses::add(&mut parts);
     let mut ids = 1..;
     let mut next = || ids.next().unwrap_or(0);
 
-    for place in cars(time) {
+    for place in cars(time, variation) {
         car(&mut parts, next(), &place);
     }
-    for person in people() {
+    for person in people(variation) {
         walker(&mut parts, next(), &person, time);
     }
     for (x, y) in [(6.3, 17.0), (6.3, 36.2), (6.3, 57.0), (-6.3, 26.0), (-6.3, 44.0), (-6.3, 66.0)]
     {
+        let id = y as u32;
+        let x = x + variation.shift(900 + id, -0.3, 0.3);
+        let y = y + variation.shift(800 + id, -2.0, 2.0);
         lamp_post(&mut parts, next(), x, y, STEP);
     }
     for (x, y) in
         [(6.05, 37.4), (6.05, 41.6), (-6.05, 37.4), (-6.05, 41.6), (6.05, 35.9), (-6.05, 43.1)]
     {
+        // Those that face each other stay so.
+        let y = y + variation.shift(1000 + (10.0 * y) as u32, -0.6, 0.6);
         bollard(&mut parts, next(), x, y, STEP);
     }
-    sign_post(&mut parts, next(), (6.2, 34.8), STEP, true);
-    sign_post(&mut parts, next(), (6.2, 22.0), STEP, false);
-    for (k, (x, y)) in [
+    let y = [(34.8, 31, -2.0, 1.0), (22.0, 32, -3.0, 3.0)]
+        .map(|(y, id, low, high)| y + variation.shift(id, low, high));
+    sign_post(&mut parts, next(), (6.2, y[0]), STEP, true);
+    sign_post(&mut parts, next(), (6.2, y[1]), STEP, false);
+    for (k, (x, y)) in (0..).zip([
         (6.6, 12.5),
         (6.6, 28.5),
         (6.6, 48.0),
@@ -63,11 +78,9 @@ pub fn compose(time: f64) -> World {
         (-6.6, 53.0),
         (6.6, 70.0),
         (-6.6, 76.0),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        tree(&mut parts, next(), (x, y), STEP, 300 + k as u32);
+    ]) {
+        let y = y + variation.shift(400 + k, -3.0, 3.0);
+        tree(&mut parts, next(), (x, y), STEP, variation.style(300 + k));
     }
     hedge(&mut parts, (8.6, 61.0), 9.0, STEP, 401);
     hedge(&mut parts, (-8.6, 84.0), 12.0, STEP, 402);
@@ -76,13 +89,13 @@ pub fn compose(time: f64) -> World {
         parts,
         lighting: lighting(driven(time)),
         backdrop: Backdrop::Street,
-        camera: camera(time),
+        camera: camera(time, variation),
     }
 }
 
 /// Pose of the left camera: the car sways a little.
-fn camera(time: f64) -> Pose {
-    let x = 1.65 + 0.10 * libm::sin(0.9 * time + 0.4);
+fn camera(time: f64, variation: Variation) -> Pose {
+    let x = 1.65 + variation.shift(11, -0.25, 0.25) + 0.10 * libm::sin(0.9 * time + 0.4);
     let bob = 0.012 * libm::sin(7.1 * time) + 0.006 * libm::sin(11.3 * time + 1.0);
     let heading = 0.012 * libm::sin(0.8 * time + 1.2);
     let pitch = -0.010 + 0.0035 * libm::sin(5.3 * time) + 0.002 * libm::sin(9.1 * time);
@@ -114,26 +127,26 @@ fn ground() -> Vec<Part> {
     parts
 }
 
-fn cars(time: f64) -> Vec<CarPlace> {
+fn cars(time: f64, variation: Variation) -> Vec<CarPlace> {
     let north = std::f64::consts::FRAC_PI_2;
     let parked = |x: f64, y: f64, model, paint, seed: u32| CarPlace {
         x: x + 0.12 * super::noise::pick(seed, 1, -1.0, 1.0),
-        y,
+        y: y + variation.shift(seed, -0.9, 0.9),
         heading: if x > 0.0 { north } else { -north }
             + 0.02 * super::noise::pick(seed, 2, -1.0, 1.0),
-        model,
-        paint: rgb(paint),
+        model: variation.choose(seed + 5000, model, &Model::ALL),
+        paint: rgb(variation.choose(seed + 6000, paint, &PAINTS)),
         rolled: super::noise::pick(seed, 3, 0.0, 1.0),
         braking: false,
         seed,
     };
     // Oncoming, past the camera after two seconds.
-    let near = 27.0 - 7.5 * time;
+    let near = 27.0 + variation.shift(1, -4.0, 6.0) - 7.5 * time;
     // Oncoming, stopping at the crossing.
     let brake = time.min(5.0);
-    let far = 67.0 - 8.0 * brake + 0.8 * brake * brake;
+    let far = 67.0 + variation.shift(2, -3.0, 6.0) - 8.0 * brake + 0.8 * brake * brake;
     // Ahead, driving off beyond the crossing.
-    let ahead = 46.0 + 5.0 * time;
+    let ahead = 46.0 + variation.shift(3, -4.0, 8.0) + 5.0 * time;
     let moving = |x: f64, y: f64, heading, model, paint, seed, braking| CarPlace {
         x,
         y,
@@ -164,7 +177,22 @@ fn cars(time: f64) -> Vec<CarPlace> {
     ]
 }
 
-fn people() -> Vec<Walker> {
+fn people(variation: Variation) -> Vec<Walker> {
+    let mut people = shipped_people();
+    for Walker { from, velocity, height, style, .. } in &mut people {
+        let id = *style;
+        // Who crosses the road stays on the crossing.
+        let along = if velocity.0.abs() > 1.0 { 0.2 } else { 1.0 };
+        from.0 += variation.shift(id, -0.4, 0.4);
+        from.1 += along * variation.shift(id + 50, -3.0, 3.0);
+        velocity.1 *= variation.scale(id + 100, 0.7, 1.3);
+        *height *= variation.scale(id + 150, 0.93, 1.06);
+        *style = variation.style(id);
+    }
+    people
+}
+
+fn shipped_people() -> Vec<Walker> {
     let middle = f64::midpoint(ZEBRA.0, ZEBRA.1);
     vec![
         // On the crossing, one from each side.

@@ -17,6 +17,11 @@ pub enum Model {
     Van,
 }
 
+impl Model {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Hatchback, Self::Saloon, Self::Van];
+}
+
 /// One car at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct CarPlace {
