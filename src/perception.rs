@@ -56,9 +56,10 @@ pub struct View {
 /// The region of interest: what is salient, and what is matched because of it.
 #[derive(Clone, Debug, Default)]
 pub struct RoiMask {
-    /// 255 where salient after clean-up, else 0; full size.
+    /// 255 where salient after clean-up and at poles, else 0; full size.
     pub salient: Image<u8>,
-    /// 255 where disparity is computed: `salient` dilated by `roi.dilation`; full size.
+    /// 255 where disparity is computed: `salient` dilated by `roi.dilation`, and poles, which
+    /// are matched as whole lines and not dilated; full size.
     pub matched: Image<u8>,
     /// Share of the image inside `matched`, 0..=1.
     pub fraction: f32,

@@ -163,8 +163,6 @@ impl Pipeline {
         );
         let plane = footing.ground().filter(|_| self.roi.follows_attention());
         self.poles.find(&out.left, &self.right, &out.rig, plane);
-        self.roi.include(self.poles.list(), &mut out.roi);
-        self.poles.raise(&mut out.attention, out.left.gray.width());
         lap.mark(&mut out.times, Stage::Stereo);
 
         self.refine.run(
@@ -175,6 +173,10 @@ impl Pipeline {
             &mut out.disparity,
             &mut out.confidence,
         );
+        // Not before: what is beside them was matched by its own window.
+        let included = self.roi.include(self.poles.list(), &mut out.roi);
+        self.poles.truncate(included);
+        self.poles.raise(&mut out.attention, out.left.gray.width());
         self.poles.paint(&out.roi.matched, &mut out.disparity, &mut out.confidence);
         lap.mark(&mut out.times, Stage::Refine);
 

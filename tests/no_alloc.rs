@@ -38,8 +38,11 @@ fn texture(x: usize, y: usize, seed: u32) -> u8 {
 /// Row of the horizon of a road.
 const HORIZON: usize = 60;
 
+/// First column and disparity of a post on the road, four pixels wide.
+const POST: (usize, usize) = (208, 14);
+
 /// A far, dull background and three bright boxes that move and come nearer; on a `road`
-/// they stand on it.
+/// they and a post stand on it.
 fn frame(index: usize, road: bool, rig: &Arc<StereoRig>) -> StereoFrame {
     let view = |is_right: bool| {
         Image::from_fn(SIZE, |x, y| {
@@ -52,6 +55,10 @@ fn frame(index: usize, road: bool, rig: &Arc<StereoRig>) -> StereoFrame {
                     let v = texture(x + shift - bx, y - by, k as u32);
                     return [200_u8.saturating_add(v / 5), v / 2, 30 * k as u8];
                 }
+            }
+            let at = x + if is_right { POST.1 } else { 0 };
+            if road && (POST.0..POST.0 + 4).contains(&at) && y < HORIZON + 5 * POST.1 {
+                return [20, 20, 20];
             }
             let far = if road { y.saturating_sub(HORIZON) / 5 } else { 3 };
             let shift = if is_right { far } else { 0 };
@@ -139,6 +146,8 @@ fn a_warm_pipeline_allocates_nothing() {
         );
         let ground = perception.ground == GroundState::Measured;
         assert_eq!(ground, road == 1, "{variant:?}");
+        let post = perception.disparity.get(POST.0 + 2, 20);
+        assert_eq!((post - POST.1 as f32).abs() < 0.5, road == 1, "a post at {post} px");
     }
     assert!(regions_seen.iter().all(|n| *n > 0), "the scenes have regions to allocate for");
 }

@@ -25,7 +25,7 @@ pub struct RenderArgs {
     /// Width of the pictures in pixels; the height follows
     #[arg(long, value_name = "PIXELS")]
     pub width: Option<usize>,
-    /// Another street: other cars, people, posts and trees in other places
+    /// Another street: other parked cars, people, posts and trees in other places; 0 is the shipped one
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
 }

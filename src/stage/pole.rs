@@ -26,11 +26,22 @@ use line::Lines;
 /// Bands below the horizon in which poles are looked for: what is higher than the camera
 /// reaches above it, and below are the fences, wheels and shadows.
 const BELOW: usize = 3;
-/// Attention for a pole: it stands out on both sides.
-const ATTENTION: f32 = 0.55;
-/// What is nearer or farther than a pole differs by these pixels and parts.
-const APART_PX: f32 = 1.0;
-const APART_PART: f32 = 0.1;
+/// Chains that are matched, from above: roads have about a hundred, and more is a façade.
+const MOST_CHAINS: usize = 1000;
+/// Attention for a pole, at least: it stands out on both sides, but where attention is
+/// scarce cars and people come first.
+const ATTENTION: f32 = 0.4;
+/// Confidence of a pole's disparity: so much at least, more by the part by which it costs less
+/// than at any other disparity, and so much at most. Of 868 poles on nine rendered streets 69 %
+/// of the pixels are right within 3 px or 5 % at a part of .2, 90 % at .46, 95 % at .75.
+const LEAST_CONFIDENCE: f32 = 0.6;
+const PER_PART: f32 = 0.65;
+const MOST_CONFIDENCE: f32 = 0.94;
+
+/// By how many pixels what is nearer or farther than something of this disparity differs.
+fn apart(disparity: f32) -> f32 {
+    f32::max(1.0, 0.1 * disparity)
+}
 
 /// A pole before something farther away.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,11 +56,16 @@ pub struct Pole {
     pub rows: Range<usize>,
     /// Its disparity, pixels (`cx_l - cx_r` subtracted).
     pub disparity: f32,
-    /// By which part it costs less than at any other disparity.
-    pub certainty: f32,
+    /// Probability that this is right within 3 px or 5 %.
+    pub confidence: f32,
 }
 
 impl Pole {
+    /// Whether what is at one of its pixels is nearer; NaN is not.
+    pub fn is_hidden_by(&self, disparity: f32) -> bool {
+        disparity > self.disparity + apart(self.disparity)
+    }
+
     /// Its pixels in row `y` of an image that is `width` wide.
     pub fn columns(&self, y: usize, width: usize) -> Range<usize> {
         let left = self.column + self.lean * (y as f32 + 0.5);
@@ -62,7 +78,11 @@ impl Pole {
 #[derive(Debug)]
 pub struct Poles {
     level: Level,
-    end: usize,
+    /// Disparities searched, `x_l - x_r` in pixels.
+    search: Range<usize>,
+    /// Nearest and farthest depth that counts, metres.
+    depth_m: [f64; 2],
+    min_confidence: f32,
     left: Image<f32>,
     right: Image<f32>,
     ridges: Ridges,
@@ -75,10 +95,12 @@ impl Poles {
     /// The finder with instructions of `level`.
     pub fn new(config: &Config, level: Level) -> Self {
         let stereo = &config.stereo;
-        let end = stereo.min_disparity.max(0) + stereo.disparity_range.max(1);
+        let start = stereo.min_disparity.max(0) as usize;
         Self {
             level,
-            end: usize::try_from(end).unwrap_or(1),
+            search: start..start + stereo.disparity_range.max(1) as usize,
+            depth_m: [config.depth.min, config.depth.max],
+            min_confidence: config.min_confidence as f32,
             left: Image::default(),
             right: Image::default(),
             ridges: Ridges::new(level),
@@ -88,24 +110,37 @@ impl Poles {
         }
     }
 
-    /// Finds the poles on `plane`, the nearest first; none without a plane.
+    /// Finds the poles on `plane`, the nearest first; none without a plane. They show at least
+    /// forty rows above the horizon or a little below, and are not before a side without
+    /// texture told from what is on it: that looks far away, as the sky does.
     pub fn find(&mut self, left: &View, right: &View, rig: &StereoRig, plane: Option<&Plane>) {
         self.list.clear();
         let Some(plane) = plane.filter(|plane| plane.a > 0.0) else { return };
         let horizon = -(plane.c + plane.b * left.gray.width() as f32 / 2.0) / plane.a;
-        let upper = (horizon.max(0.0) / ROWS as f32) as usize + BELOW;
+        let upper = ((horizon.max(0.0) / ROWS as f32) as usize).saturating_add(BELOW);
         shrink(self.level, &left.gray, &mut self.left);
         shrink(self.level, &right.gray, &mut self.right);
         self.ridges.find(&self.left, upper);
         self.chains.find(&self.ridges);
-        let end = self.end.min(self.left.width());
-        let views = Views { bands: [&self.left, &self.right], plane, rig, end };
-        for chain in self.chains.iter() {
-            self.list.extend(self.lines.measure(chain, &views));
+        let end = self.search.end.min(self.left.width());
+        let search = self.search.start.min(end)..end;
+        let views = Views { bands: [&self.left, &self.right], plane, rig, search };
+        let [near_m, far_m] = self.depth_m;
+        for chain in self.chains.iter().take(MOST_CHAINS) {
+            let Some(pole) = self.lines.measure(chain, &views) else { continue };
+            let depth_m = rig.depth_scale() / f64::from(pole.disparity);
+            if (near_m..=far_m).contains(&depth_m) && pole.confidence >= self.min_confidence {
+                self.list.push(pole);
+            }
         }
         self.list.sort_unstable_by(|a, b| {
             b.disparity.total_cmp(&a.disparity).then(a.column.total_cmp(&b.column))
         });
+    }
+
+    /// Keeps the nearest `count` of them.
+    pub fn truncate(&mut self, count: usize) {
+        self.list.truncate(count);
     }
 
     /// The poles of the last run.
@@ -139,14 +174,11 @@ impl Poles {
     ) {
         let width = disparity.width();
         for pole in &self.list {
-            let nearest = pole.disparity + APART_PX.max(APART_PART * pole.disparity);
             for y in pole.rows.clone() {
                 for x in pole.columns(y, width) {
-                    let known = disparity.get(x, y);
-                    let free = known.is_nan() || known <= nearest;
-                    if matched.get(x, y) != 0 && free {
+                    if matched.get(x, y) != 0 && !pole.is_hidden_by(disparity.get(x, y)) {
                         disparity.set(x, y, pole.disparity);
-                        confidence.set(x, y, pole.certainty);
+                        confidence.set(x, y, pole.confidence);
                     }
                 }
             }

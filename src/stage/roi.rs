@@ -100,10 +100,11 @@ impl Roi {
     }
 
     /// Adds `poles` to both masks of the last run, which are matched as whole lines, as long
-    /// as `roi.max_fraction` and the allowance have room for them.
-    pub fn include(&mut self, poles: &[Pole], out: &mut RoiMask) {
+    /// as `roi.max_fraction` and the allowance have room for them; returns how many had.
+    pub fn include(&mut self, poles: &[Pole], out: &mut RoiMask) -> usize {
         let limit = self.limit();
         let width = self.size.width;
+        let mut count = 0;
         for pole in poles {
             let spans = || pole.rows.clone().map(|y| (y, pole.columns(y, width)));
             let new: usize = spans()
@@ -113,6 +114,7 @@ impl Roi {
                 break;
             }
             self.area += new;
+            count += 1;
             for (y, columns) in spans() {
                 for (mask, image) in [
                     (&mut self.masks.salient, &mut out.salient),
@@ -124,6 +126,7 @@ impl Roi {
             }
         }
         out.fraction = self.area as f32 / self.size.area().max(1) as f32;
+        count
     }
 
     /// Pixels that may be matched.

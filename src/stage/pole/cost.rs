@@ -1,5 +1,7 @@
 //! What it costs that a pixel of the left view is one of the right view, in bands.
 
+use std::ops::Range;
+
 use crate::camera::StereoRig;
 use crate::image::Image;
 use crate::simd::Simd;
@@ -7,8 +9,9 @@ use crate::stage::ground::Plane;
 
 /// Most that the difference of two pixels may cost, of 255: one of them is of something else.
 pub const MOST_COST: f32 = 30.0;
+
 /// The two views in bands, and what is known of the scene.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Views<'a> {
     /// Mean brightness per band of the left and of the right view.
     pub bands: [&'a Image<f32>; 2],
@@ -16,8 +19,8 @@ pub struct Views<'a> {
     pub plane: &'a Plane,
     /// Calibration of the views.
     pub rig: &'a StereoRig,
-    /// Past the largest disparity that is searched, `x_l - x_r` in pixels.
-    pub end: usize,
+    /// Disparities that are searched, `x_l - x_r` in pixels.
+    pub search: Range<usize>,
 }
 
 /// Adds to the cost per disparity what pixel x of a band of the left view costs.
@@ -83,7 +86,7 @@ mod tests {
         let plane = Plane::new(0.2, 0.0, -1.0, &rig).unwrap();
         let left = Image::from_fn(size, |x, _| (x * 7 % 40) as f32);
         let right = Image::from_fn(size, |x, _| (x * 11 % 50) as f32);
-        let views = Views { bands: [&left, &right], plane: &plane, rig: &rig, end: 32 };
+        let views = Views { bands: [&left, &right], plane: &plane, rig: &rig, search: 0..32 };
         for level in simd::available() {
             for x in [0_usize, 5, 31, 59] {
                 let mut costs = [1.0; 32];

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::Pole;
 use super::band::ROWS;
 use super::chain::Link;
 use super::cost::{MOST_COST, Views, add, add_costs, least, sample};
+use super::{LEAST_CONFIDENCE, MOST_CONFIDENCE, PER_PART, Pole, apart};
 use crate::simd::{Level, Simd, dispatch};
 use crate::stage::ground::Plane;
 use crate::stage::standing::size_scale;
@@ -31,9 +31,6 @@ const ASIDE: isize = 8;
 const BANDS: usize = 2;
 /// How many pixels nearer than a line they are looked for.
 const NEARER: usize = 6;
-/// What is farther or nearer than the line differs from it by these pixels and parts.
-const APART_PX: f32 = 1.0;
-const APART_PART: f32 = 0.1;
 /// A band shows the line if it costs less than this part of what is beside, and by so much.
 const MOST_OF_BESIDE: f32 = 0.8;
 const LESS: f32 = 1.0;
@@ -48,9 +45,10 @@ const LEAST_TOP_M: f32 = 1.2;
 /// Rows that a pole is high, at least, and that its foot may be beside the ground.
 const LEAST_ROWS: usize = 40;
 const FOOT_ROWS: f32 = 22.0;
-/// Rows by which its foot is moved to the ground.
-const STRETCH_ROWS: f32 = 16.0;
-/// Pixels by which what hides its foot is nearer.
+/// Rows below the ground that are cut from its foot, at most.
+const CUT_ROWS: f32 = 16.0;
+/// Pixels by which what hides its foot is nearer, and in how many bands below its end that begins.
+const HIDDEN_BANDS: usize = 4;
 const HIDDEN_PX: f32 = 0.7;
 /// Steps of a pixel in which its sides are looked for.
 const STEPS: f32 = 4.0;
@@ -138,26 +136,26 @@ impl Lines {
     #[inline(always)]
     fn measure_at<S: Simd>(&mut self, simd: S, chain: &[Link], views: &Views<'_>) -> Option<Pole> {
         let axis = Axis::of(chain, views, &mut self.profile)?;
-        let (found, certainty) = self.match_line(simd, &axis, chain, views)?;
+        let (found, part) = self.match_line(simd, &axis, chain, views)?;
         let disparity = found - views.rig.disparity_offset() as f32;
         let (first, last) = (chain[0].band, chain[chain.len() - 1].band);
         let Plane { a, b, c, .. } = *views.plane;
         let foot = (disparity - c - b * axis.column(last)) / a;
         let bands = views.bands[0].height();
-        let lowest = ((foot / ROWS as f32).max(0.0) as usize + 1).min(bands - 1);
+        let lowest = ((foot / ROWS as f32).max(0.0) as usize).saturating_add(1).min(bands - 1);
         if disparity < LEAST_PX || lowest <= first {
             return None;
         }
         let last = last.min(lowest);
-        let apart = APART_PX.max(APART_PART * found);
+        let farthest = found - apart(disparity);
         // Most are windows and fences: the bands of the chain tell.
         self.look_aside(simd, &axis, first..last + 1, found, views);
-        let free = (first..=last).filter(|band| self.is_free(*band, found, apart)).count();
+        let free = (first..=last).filter(|band| self.is_free(*band, farthest)).count();
         if (free as f32) < LEAST_FREE * (last + 1 - first) as f32 {
             return None;
         }
         self.look_aside(simd, &axis, 0..lowest + 1, found, views);
-        self.compare(&axis, found, apart, views);
+        self.compare(&axis, found, farthest, views);
         let span = self.extend(first..last + 1);
         let n = span.len() as f32;
         let shown = self.shown[span.clone()].iter().filter(|shown| **shown).count() as f32;
@@ -167,8 +165,9 @@ impl Lines {
         let rows = span.start * ROWS..span.end * ROWS;
         let low = (rows.end as f32 - foot).abs();
         // What is nearer hides the rest.
-        let below = (span.end + 1).min(lowest);
-        let hidden = self.sides.iter().any(|side| side[below] > found + HIDDEN_PX);
+        let below = span.end.min(lowest)..(span.end + HIDDEN_BANDS).min(lowest + 1);
+        let nearer = |side: &Vec<f32>| side[below.clone()].iter().any(|d| *d > found + HIDDEN_PX);
+        let hidden = self.sides.iter().any(nearer);
         if low > FOOT_ROWS && !hidden || rows.len() < LEAST_ROWS {
             return None;
         }
@@ -181,7 +180,7 @@ impl Lines {
         {
             return None;
         }
-        let end = if low < STRETCH_ROWS { rows.end.min(foot as usize) } else { rows.end };
+        let end = if low < CUT_ROWS { rows.end.min(foot as usize) } else { rows.end };
         let lean = axis.lean / ROWS as f32;
         Some(Pole {
             column: axis.at - lean * (ROWS as f32 / 2.0) + sides[0],
@@ -189,7 +188,7 @@ impl Lines {
             width: sides[1] - sides[0],
             rows: rows.start..end.min(bands * ROWS),
             disparity,
-            certainty,
+            confidence: (LEAST_CONFIDENCE + PER_PART * part).min(MOST_CONFIDENCE),
         })
     }
 
@@ -208,7 +207,8 @@ impl Lines {
         let widest = axis.width + 1.0;
         let baseline = views.rig.baseline_m as f32;
         let most = widest * baseline / WIDTHS_M[0] + views.rig.disparity_offset() as f32;
-        let end = (most as usize + NEIGHBOURS).min(views.end);
+        let end = (most as usize).saturating_add(NEIGHBOURS).min(views.search.end);
+        let start = views.search.start.min(end);
         for costs in [&mut *own, &mut *margin] {
             costs.clear();
             costs.resize(end, 0.0);
@@ -225,15 +225,20 @@ impl Lines {
         for (own, margin) in own.iter_mut().zip(&*margin) {
             *own = *own * n + MARGIN_WEIGHT * (*own + *margin) * all;
         }
+        own[..start].fill(f32::INFINITY);
         let (best, cost) = least(own)?;
+        // At an end of the range nothing is known beyond it.
+        if best == start || best + 1 == end {
+            return None;
+        }
         let next = own[..best.saturating_sub(NEIGHBOURS)].iter();
         let next = next.chain(own.iter().skip(best + NEIGHBOURS + 1));
         let next = next.fold(f32::INFINITY, |least, cost| least.min(*cost));
-        if cost > MOST_OF_NEXT * next {
+        if next.is_infinite() || cost > MOST_OF_NEXT * next {
             return None;
         }
         let found = refine(axis, chain, views, best as f32);
-        Some((found, if next.is_finite() { 1.0 - cost / next } else { 0.0 }))
+        Some((found, 1.0 - cost / next))
     }
 
     /// Fills `sides` with the disparity of what is to the left and to the right in `bands`.
@@ -247,7 +252,7 @@ impl Lines {
         views: &Views<'_>,
     ) {
         let Self { sides, costs, sums, .. } = self;
-        let searched = (found as usize + NEARER + 1).min(views.end);
+        let searched = (found as usize + NEARER + 1).min(views.search.end);
         for (k, side) in sides.iter_mut().enumerate() {
             costs.clear();
             costs.resize(bands.len() * searched, 0.0);
@@ -280,7 +285,7 @@ impl Lines {
 
     /// Tells in which bands the line is better explained by its own disparity than by what is
     /// beside, which is farther away.
-    fn compare(&mut self, axis: &Axis, found: f32, apart: f32, views: &Views<'_>) {
+    fn compare(&mut self, axis: &Axis, found: f32, farthest: f32, views: &Views<'_>) {
         let width = axis.width as isize;
         self.shown.clear();
         for band in 0..self.sides[0].len() {
@@ -290,7 +295,7 @@ impl Lines {
                 let difference = |x| (sample(left, x as f32) - sample(right, x as f32 - d)).abs();
                 (first..first + width).map(difference).sum::<f32>() / width as f32
             };
-            let free = self.is_free(band, found, apart);
+            let free = self.is_free(band, farthest);
             let shown = free && {
                 let beside = cost(self.sides[0][band]).min(cost(self.sides[1][band]));
                 cost(found) < MOST_OF_BESIDE * beside - LESS
@@ -299,8 +304,8 @@ impl Lines {
         }
     }
 
-    fn is_free(&self, band: usize, found: f32, apart: f32) -> bool {
-        self.sides.iter().all(|side| side[band] < found - apart)
+    fn is_free(&self, band: usize, farthest: f32) -> bool {
+        self.sides.iter().all(|side| side[band] < farthest)
     }
 
     /// The bands of a chain and those beyond its ends that show the line.
@@ -317,8 +322,8 @@ impl Lines {
         start..end
     }
 
-    /// Where the mean profile across the line is as far from its own brightness as from that of
-    /// what is beside: columns from the axis to its left and its right side.
+    /// Where the mean profile across the line comes as near to the brightness of what is beside
+    /// as [`TOWARDS_OWN`] allows: columns from the axis to its left and its right side.
     fn find_sides(&mut self, axis: &Axis, chain: &[Link], views: &Views<'_>) -> [f32; 2] {
         let half = axis.width / 2.0;
         let reach = ((half + BEYOND) * STEPS) as isize;

@@ -79,7 +79,7 @@ impl Upright {
         self.painter.run(plane, source, (&self.things, &self.fine), count, out);
         self.trim(plane, source, out);
         self.follow(plane, source, out);
-        adopt(source.poles, out);
+        adopt(source.poles, source.disparity, out);
         rejections.floating = self.things.floating;
         rejections.background = self.things.background;
         rejections.not_salient = (self.things.list.len() - count) as u32;
