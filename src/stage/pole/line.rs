@@ -52,11 +52,11 @@ const HIDDEN_BANDS: usize = 4;
 const HIDDEN_PX: f32 = 0.7;
 /// Steps of a pixel in which its sides are looked for.
 const STEPS: f32 = 4.0;
+/// Pixels beyond the ridge that are asked for them.
+const BEYOND: f32 = 4.0;
 /// What is up to so many times as far from its own brightness as from that beside is the pole's:
 /// what is round is darker at one side.
 const TOWARDS_OWN: f32 = 1.5;
-/// Pixels beyond the ridge that are asked for them.
-const BEYOND: f32 = 4.0;
 
 /// The measuring of lines, with its buffers.
 #[derive(Debug)]
