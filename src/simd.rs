@@ -43,6 +43,10 @@ pub fn available() -> Vec<Level> {
     levels
 }
 
+/// The ends of rows are taken value by value in vectors of up to so many: a copy is a call,
+/// before which all others are put away, even if it is not met.
+const ONE_BY_ONE: usize = 16;
+
 /// The values from `at` on; `beyond` where the row has ended.
 #[inline(always)]
 pub(crate) fn padded<S: Simd, V: SimdBase<S>>(
@@ -56,7 +60,13 @@ pub(crate) fn padded<S: Simd, V: SimdBase<S>>(
         return V::from_slice(simd, &row[..V::LEN]);
     }
     let mut values = V::splat(simd, beyond);
-    values.as_mut_slice()[..row.len()].copy_from_slice(row);
+    if V::LEN > ONE_BY_ONE {
+        values.as_mut_slice()[..row.len()].copy_from_slice(row);
+    } else {
+        for (i, value) in values.as_mut_slice().iter_mut().enumerate() {
+            *value = row.get(i).copied().unwrap_or(beyond);
+        }
+    }
     values
 }
 
@@ -67,7 +77,11 @@ pub(crate) fn store_inside<S: Simd, V: SimdBase<S>>(row: &mut [V::Element], at: 
     if row.len() >= V::LEN {
         values.store_slice(&mut row[..V::LEN]);
     } else {
-        row.copy_from_slice(&values.as_slice()[..row.len()]);
+        for (i, value) in values.as_slice().iter().enumerate() {
+            if let Some(out) = row.get_mut(i) {
+                *out = *value;
+            }
+        }
     }
 }
 
