@@ -1,5 +1,7 @@
 //! Depth from disparity (eq. 2).
 
+use std::ops::Range;
+
 use crate::camera::StereoRig;
 use crate::config::Config;
 use crate::image::Image;
@@ -60,6 +62,23 @@ impl Depth {
         let z = if z > self.max_m { f32::INFINITY } else { z };
         let z = if d <= 0.0 { f32::INFINITY } else { z };
         if d.is_nan() { f32::NAN } else { z }
+    }
+
+    /// The bits of the disparities whose depth is finite: depth falls with disparity, and
+    /// bits of positive numbers have their order.
+    pub fn finite_bits(&self, scale_px_m: f32) -> Range<u32> {
+        let depth = |bits: u32| self.of(f32::from_bits(bits), scale_px_m);
+        // The first one from which on it holds.
+        let first = |holds: &dyn Fn(u32) -> bool| {
+            let (mut from, mut to) = (1, f32::INFINITY.to_bits() + 1);
+            while from < to {
+                let middle = u32::midpoint(from, to);
+                if holds(middle) { to = middle } else { from = middle + 1 }
+            }
+            from
+        };
+        let end = first(&|bits| depth(bits) == f32::NEG_INFINITY);
+        first(&|bits| depth(bits) != f32::INFINITY)..end
     }
 
     /// The same of sixteen pixels.

@@ -54,3 +54,25 @@ fn pixels_in_a_vector_and_behind_it_have_the_same_depth() {
         );
     }
 }
+
+#[test]
+fn the_bits_of_finite_depths_are_those_whose_depth_is_finite() {
+    let limits = |low: f64, high: f64| {
+        let mut config = Config::default();
+        (config.depth.min, config.depth.max) = (low, high);
+        Depth::new(&config)
+    };
+    for (low, high) in [(0.1, 80.0), (0.0, 80.0), (2.0, 2.5), (0.3, 1e30)] {
+        let depth = limits(low, high);
+        for scale in [1e-3, 35.0, 387.5, 1e6] {
+            let range = depth.finite_bits(scale);
+            // All exponents and signs, infinity and NaN, and what is next to the ends.
+            let steps = (0..=u16::MAX).map(|upper| u32::from(upper) << 16 | 0x0123);
+            let ends = [range.start, range.end].into_iter().flat_map(|end| end - 1..=end + 1);
+            for bits in steps.chain(ends).chain([0, f32::INFINITY.to_bits(), 0x8000_0000]) {
+                let z = depth.of(f32::from_bits(bits), scale);
+                assert_eq!(range.contains(&bits), z.is_finite(), "{bits:#x}: {z}, {low}, {high}");
+            }
+        }
+    }
+}

@@ -2,6 +2,8 @@
 
 mod sums;
 
+use std::ops::Range;
+
 use super::RegionSource;
 use super::candidates::{Candidates, PixelBox};
 use crate::camera::StereoRig;
@@ -51,6 +53,8 @@ pub struct Evidence {
 pub struct Measure {
     level: Level,
     depth: Depth,
+    /// The bits of disparities whose depth is finite, for this f B.
+    finite: (f32, Range<u32>),
     /// Bits of disparities, which are positive: they have the same order.
     sample: Vec<u32>,
     row: Vec<f32>,
@@ -59,7 +63,7 @@ pub struct Measure {
 impl Measure {
     /// The measuring with instructions of `level`, of depths within the limits of `depth`.
     pub fn new(level: Level, depth: Depth) -> Self {
-        Self { level, depth, sample: Vec::new(), row: Vec::new() }
+        Self { level, depth, finite: (f32::NAN, 0..0), sample: Vec::new(), row: Vec::new() }
     }
 
     /// Fills box, mask and all measures of `region` from the pixels of `bounds`
@@ -150,14 +154,19 @@ impl Measure {
         let step = (bounds.area / every).div_ceil(MOST_VALUES).max(1);
         self.sample.resize(bounds.height().div_ceil(every) * bounds.width().div_ceil(step), 0);
         let scale = source.rig.depth_scale() as f32;
-        let mut n = 0;
+        if self.finite.0 != scale {
+            self.finite = (scale, self.depth.finite_bits(scale));
+        }
+        let Range { start, end } = self.finite.1;
+        let (finite, mut n) = (end.saturating_sub(start), 0);
         for (row, y) in (bounds.y0 + first..bounds.y1).step_by(every).enumerate() {
             let (d, ids) = (source.disparity.row(y), ids.row(y));
             let from = bounds.x0 + row * SHIFT % step;
             for x in (from..bounds.x1).step_by(step) {
                 // What does not count is written over: nobody can foresee what does.
-                self.sample[n] = d[x].to_bits();
-                n += usize::from((ids[x] == id) & self.depth.of(d[x], scale).is_finite());
+                let bits = d[x].to_bits();
+                self.sample[n] = bits;
+                n += usize::from((ids[x] == id) & (bits.wrapping_sub(start) < finite));
             }
         }
         self.sample.truncate(n);
