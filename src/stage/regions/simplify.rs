@@ -1,9 +1,11 @@
 //! Polygons with fewer points.
 
-use crate::simd::{Level, Simd, dispatch, f64x8, mask64x8, prelude::*};
+use std::cmp::Ordering;
+
+use crate::simd::{Level, Simd, dispatch, i32x16, mask32x16, prelude::*};
 
 /// Points whose distances are reckoned side by side.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// The simplification with its buffers. A stack of its own takes the place of
 /// recursion: boundaries may have as many points as the image has pixels.
@@ -59,27 +61,28 @@ impl Simplify {
     }
 }
 
-/// Columns and rows of points, and room for a whole group behind the last one. Whole
-/// numbers, in a form that vectors multiply: exact for images with a diagonal of up to
-/// 9700 pixels.
+/// Columns and rows of points, and room for a whole group behind the last one.
 #[derive(Debug, Default)]
 struct Points {
-    x: Vec<f64>,
-    y: Vec<f64>,
+    x: Vec<i32>,
+    y: Vec<i32>,
 }
 
 impl Points {
     fn take(&mut self, points: &[[i32; 2]]) {
         for (axis, out) in [&mut self.x, &mut self.y].into_iter().enumerate() {
             out.clear();
-            out.extend(points.iter().map(|point| f64::from(point[axis])));
-            out.resize(points.len() + LANES, 0.0);
+            out.extend(points.iter().map(|point| point[axis]));
+            out.resize(points.len() + LANES, 0);
         }
     }
 
     /// The first of those between `from` and `to` that are farthest from the segment from
     /// point `from` to point `end`, if that is farther than the root of `limit`, in square
     /// pixels.
+    ///
+    /// All is whole numbers, exact for images with a diagonal of up to 32767 pixels: none is
+    /// larger than [`crate::ros::convert::MAX_SIDE`] allows.
     #[inline(always)]
     fn farthest<S: Simd>(
         &self,
@@ -91,32 +94,61 @@ impl Points {
     ) -> Option<usize> {
         let (x0, y0) = (self.x[from], self.y[from]);
         let (bx, by) = (self.x[end] - x0, self.y[end] - y0);
-        // The segment's squared length, or 1 where it has none; distances are multiplied by
-        // it, so that nothing is divided.
-        let scale = (bx * bx + by * by).max(1.0);
-        let zero = f64x8::splat(simd, 0.0);
-        let (mut most, mut farthest) = (limit * scale, None);
-        for at in (from + 1..to).step_by(LANES) {
-            let x = f64x8::from_slice(simd, &self.x[at..at + LANES]) - x0;
-            let y = f64x8::from_slice(simd, &self.y[at..at + LANES]) - y0;
-            let along = x * bx + y * by;
-            let before = (x * x + y * y) * scale;
-            let behind = ((x - bx) * (x - bx) + (y - by) * (y - by)) * scale;
-            let line = x * by - y * bx;
-            let ends = along.simd_le(0.0).select(before, behind);
-            let beside = along.simd_gt(0.0) & along.simd_lt(scale);
-            let mut distance = beside.select(line * line, ends);
-            if at + LANES > to {
-                let inside = mask64x8::from_bitmask(simd, (1 << (to - at)) - 1);
-                distance = inside.select(distance, zero);
-            }
-            if distance.simd_gt(most).any_true() {
-                most = distance.reduce_max();
-                let first = distance.simd_eq(most).to_bitmask().trailing_zeros();
-                farthest = Some(at + first as usize);
-            }
+        let length = bx * bx + by * by;
+        let zero = i32x16::splat(simd, 0);
+        let mut at = i32x16::from_fn(simd, |i| (from + 1 + i) as i32);
+        // The points beside the segment by the area of the triangle with it, doubled, and
+        // those beyond its ends by the square of the distance from there.
+        let [mut beside, mut beyond] = [Farthest { most: zero, at }; 2];
+        for start in (from + 1..to).step_by(LANES) {
+            let x = i32x16::from_slice(simd, &self.x[start..start + LANES]) - x0;
+            let y = i32x16::from_slice(simd, &self.y[start..start + LANES]) - y0;
+            let (along, across) = (x * bx + y * by, x * by - y * bx);
+            let before = x * x + y * y;
+            let behind = before - along - along + length;
+            let inside = at.simd_lt(to as i32);
+            let is_beside = along.simd_gt(0) & along.simd_lt(length);
+            let ends = along.simd_le(0).select(before, behind);
+            beside.take(inside & is_beside, across.max(zero - across), at);
+            beyond.take(inside & !is_beside, ends, at);
+            at += LANES as i32;
         }
-        farthest
+        // Distances are multiplied by the segment's length, or 1 where it has none, so that
+        // nothing is divided.
+        let scale = i64::from(length.max(1));
+        let ((area, first), (square, second)) = (beside.of_all(), beyond.of_all());
+        let (beside, beyond) = (area * area, square * scale);
+        let (most, farthest) = match beside.cmp(&beyond) {
+            Ordering::Greater => (beside, first),
+            Ordering::Less => (beyond, second),
+            Ordering::Equal => (beside, first.min(second)),
+        };
+        (most as f64 > limit * scale as f64).then_some(farthest as usize)
+    }
+}
+
+/// The largest values so far in each lane, which are not negative, and where they were first.
+#[derive(Clone, Copy)]
+struct Farthest<S: Simd> {
+    most: i32x16<S>,
+    at: i32x16<S>,
+}
+
+impl<S: Simd> Farthest<S> {
+    #[inline(always)]
+    fn take(&mut self, which: mask32x16<S>, values: i32x16<S>, at: i32x16<S>) {
+        let larger = which & values.simd_gt(self.most);
+        self.most = larger.select(values, self.most);
+        self.at = larger.select(at, self.at);
+    }
+
+    /// The largest value of all lanes, and where it was first.
+    #[inline(always)]
+    fn of_all(&self) -> (i64, i32) {
+        let most = self.most.reduce_max();
+        let last = i32x16::splat(self.most.simd, i32::MAX);
+        let at = self.most.simd_eq(most).select(self.at, last).reduce_min();
+        (i64::from(most), at)
     }
 }
 
