@@ -1,7 +1,7 @@
 //! What is higher than any thing: walls, trees, whatever goes on above.
 
 use crate::image::Image;
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, padded, prelude::*, store_inside};
 use crate::stage::ground::{Plane, cell_centre};
 
 /// Height above the ground in metres over which a surface is no thing's.
@@ -19,14 +19,13 @@ const LIVES: f32 = 3.0;
 /// Cells on either side that are asked as well.
 const REACH: usize = 2;
 
-/// The share of structure, with its buffers.
+/// Columns that are followed at once.
+const LANES: usize = 16;
+
+/// The share of structure, with its buffer.
 #[derive(Debug)]
 pub struct Structure {
     level: Level,
-    /// Per column: disparity of the surface that comes down from above, and how
-    /// much it still takes to end it (0: there is none).
-    mean: Vec<f32>,
-    lives: Vec<f32>,
     /// One row of zeros and ones, with its ends repeated.
     row: Vec<f32>,
 }
@@ -34,7 +33,7 @@ pub struct Structure {
 impl Structure {
     /// The cue at this SIMD level.
     pub fn new(level: Level) -> Self {
-        Self { level, mean: Vec::new(), lives: Vec::new(), row: Vec::new() }
+        Self { level, row: Vec::new() }
     }
 
     /// Share of structure, 0..=1: the mean over five cells side by side of
@@ -46,17 +45,15 @@ impl Structure {
     pub fn run(&mut self, disparity: &Image<f32>, plane: &Plane, out: &mut Image<f32>) {
         let width = disparity.width();
         out.resize(disparity.size());
-        for buffer in [&mut self.mean, &mut self.lives] {
-            buffer.clear();
-            buffer.resize(width, 0.0);
-        }
         self.row.resize(width + 2 * REACH, 0.0);
-        let Self { level, mean, lives, row } = self;
-        dispatch!(*level, _simd => {
+        let Self { level, row } = self;
+        dispatch!(*level, simd => {
+            for x in (0..width).step_by(LANES) {
+                descend(simd, x, disparity, plane, out);
+            }
             for y in 0..disparity.height() {
                 let row = &mut row[..width + 2 * REACH];
-                let above = Above { plane, y, limit_m: if y == 0 { CUT_M } else { TALL_M } };
-                descend(&above, disparity.row(y), mean, lives, &mut row[REACH..]);
+                row[REACH..REACH + width].copy_from_slice(out.row(y));
                 let first = row[REACH];
                 row[..REACH].fill(first);
                 let last = row[width + REACH - 1];
@@ -67,35 +64,35 @@ impl Structure {
     }
 }
 
-/// What is higher than a limit, in one row.
-struct Above<'a> {
-    plane: &'a Plane,
-    y: usize,
-    limit_m: f32,
-}
-
-/// One row further down: 1 where a surface from above the limit is still there.
+/// Down the columns from `x` on: 1 where a surface from above the limit is still there.
 #[inline(always)]
-fn descend(
-    above: &Above<'_>,
-    disparity: &[f32],
-    mean: &mut [f32],
-    lives: &mut [f32],
-    out: &mut [f32],
+fn descend<S: Simd>(
+    simd: S,
+    x: usize,
+    disparity: &Image<f32>,
+    plane: &Plane,
+    out: &mut Image<f32>,
 ) {
-    let Above { plane, y, limit_m } = above;
-    let cells = disparity.iter().zip(mean).zip(lives).zip(out);
-    for (x, (((&d, mean), lives), out)) in cells.enumerate() {
-        let (u, v) = cell_centre(x, *y);
+    let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+    let full = f32x16::splat(simd, LIVES);
+    let slope = f32x16::from_fn(simd, |i| cell_centre(x + i, 0).0) * plane.b;
+    // The disparity of the surface that comes down from above, and how much it still
+    // takes to end it (0: there is none).
+    let [mut mean, mut lives] = [zero; 2];
+    for y in 0..disparity.height() {
+        let limit_m = if y == 0 { CUT_M } else { TALL_M };
+        let d: f32x16<S> = padded(simd, disparity.row(y), x, 0.0);
+        // As [`Plane::disparity`] reckons.
+        let ground = slope + plane.a * cell_centre(0, y).1 + plane.c;
         // The height is over the limit, multiplied by d.
-        let above = plane.camera_height_m * (d - plane.disparity(u, v)) > limit_m * d;
-        let step = d - *mean;
-        let same = *lives > 0.0 && step.abs() <= (SAME_PART * *mean).max(SAME_PX);
-        let hole = if step < 0.0 { (*lives - 1.0).max(0.0) } else { 0.0 };
-        *lives = if above || same { LIVES } else { hole };
-        let other = if above { d } else { *mean };
-        *mean = if same { *mean + RENEWAL * step } else { other };
-        *out = if *lives > 0.0 { 1.0 } else { 0.0 };
+        let above = ((d - ground) * plane.camera_height_m).simd_gt(d * limit_m);
+        let step = d - mean;
+        let near = step.abs().simd_le((mean * SAME_PART).max(SAME_PX));
+        let same = lives.simd_gt(zero) & near;
+        let hole = step.simd_lt(zero).select((lives - one).max(zero), zero);
+        lives = (above | same).select(full, hole);
+        mean = same.select(mean + step * RENEWAL, above.select(d, mean));
+        store_inside(out.row_mut(y), x, lives.simd_gt(zero).select(one, zero));
     }
 }
 
