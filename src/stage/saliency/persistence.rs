@@ -2,7 +2,7 @@
 
 use crate::config::{Config, SaliencyMode, ThresholdMode};
 use crate::image::{Image, Size};
-use crate::simd::{Level, Simd, dispatch, f32x16, i32x16, padded, prelude::*, store_inside};
+use crate::simd::{Level, Simd, dispatch, f32x16, i32x16, padded, prelude::*, store_inside, u64x8};
 use crate::stage::saliency::PreviousFrame;
 use crate::stage::saliency::flow::Flow;
 
@@ -118,18 +118,20 @@ fn smooth<S: Simd>(
     let size = attention.size();
     let lane = f32x16::from_fn(simd, |i| i as f32);
     for y in 0..size.height {
+        let (dx, dy, trust) = (flow.dx.row(y), flow.dy.row(y), flow.trust.row(y));
+        let (attention, gain) = (attention.row_mut(y), gain.row_mut(y));
         for x in (0..size.width).step_by(LANES) {
-            let dx: f32x16<S> = padded(simd, flow.dx.row(y), x, 0.0);
-            let dy: f32x16<S> = padded(simd, flow.dy.row(y), x, 0.0);
-            let trust: f32x16<S> = padded(simd, flow.trust.row(y), x, 0.0);
-            let place = Place::new(size, lane + x as f32 + dx, dy + y as f32);
-            let now: f32x16<S> = padded(simd, attention.row(y), x, 0.0);
+            let dx: f32x16<S> = padded(simd, dx, x, 0.0);
+            let dy: f32x16<S> = padded(simd, dy, x, 0.0);
+            let trust: f32x16<S> = padded(simd, trust, x, 0.0);
+            let place = Place::new(size, lane + x as i32 as f32 + dx, dy + y as i32 as f32);
+            let now: f32x16<S> = padded(simd, attention, x, 0.0);
             let [past, attended] = place.of(simd, past);
             let change = past - now;
             let news = ((change.abs() - NOISE) * (1.0 / (NEWS - NOISE))).max(0.0).min(1.0);
             let share = (1.0 - news * (1.0 - OLD)) * share;
-            store_inside(attention.row_mut(y), x, now + trust * share * change);
-            store_inside(gain.row_mut(y), x, trust * (attended * (STAYS + COMES) - COMES));
+            store_inside(attention, x, now + trust * share * change);
+            store_inside(gain, x, trust * (attended * (STAYS + COMES) - COMES));
         }
     }
 }
@@ -158,11 +160,11 @@ impl<S: Simd> Place<S> {
     /// after the other; what is right of the last column or below the last row has no share.
     #[inline(always)]
     fn of(&self, simd: S, cells: &[f32]) -> [f32x16<S>; 2] {
-        let [mut upper, mut lower] = [[[0.0; 2]; LANES]; 2];
-        for ((at, upper), lower) in self.at.iter().zip(&mut upper).zip(&mut lower) {
-            let cells = &cells[*at as usize..][..self.width + 2];
-            *upper = [cells[0], cells[1]];
-            *lower = [cells[self.width], cells[self.width + 1]];
+        let [mut upper, mut lower] = [[0; LANES]; 2];
+        for i in 0..LANES {
+            let cells = &cells[self.at[i] as usize..][..self.width + 2];
+            upper[i] = pair(cells[0], cells[1]);
+            lower[i] = pair(cells[self.width], cells[self.width + 1]);
         }
         let upper = self.across(simd, &upper);
         let lower = self.across(simd, &lower);
@@ -172,14 +174,21 @@ impl<S: Simd> Place<S> {
 
     /// Of both maps between a cell and the next one.
     #[inline(always)]
-    fn across(&self, simd: S, cells: &[[f32; 2]; LANES]) -> [f32x16<S>; 2] {
-        let (low, high) = cells.as_flattened().split_at(LANES);
-        let (low, high) = (f32x16::from_slice(simd, low), f32x16::from_slice(simd, high));
+    fn across(&self, simd: S, pairs: &[u64; LANES]) -> [f32x16<S>; 2] {
+        let (low, high) = pairs.split_at(LANES / 2);
+        let (low, high) = (u64x8::from_slice(simd, low), u64x8::from_slice(simd, high));
+        let (low, high): (f32x16<S>, f32x16<S>) = (low.bitcast(), high.bitcast());
         let (here, next) = low.deinterleave(high);
         let (first, second) = (here.abs(), marked(simd, here));
         let (first_next, second_next) = (next.abs(), marked(simd, next));
         [first + self.fx * (first_next - first), second + self.fx * (second_next - second)]
     }
+}
+
+/// The bits of two values, the first one in the lower half.
+#[inline(always)]
+fn pair(first: f32, second: f32) -> u64 {
+    u64::from(first.to_bits()) | u64::from(second.to_bits()) << 32
 }
 
 /// 1 where the sign is that of negative ones.

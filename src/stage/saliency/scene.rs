@@ -13,7 +13,7 @@ use super::ego::EgoMotion;
 use super::{AttentionScene, Scene};
 use crate::image::Image;
 use crate::perception::View;
-use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, u32x16};
+use crate::simd::{Level, Simd, dispatch, f32x16, i32x16, prelude::*};
 use crate::stage::ground::{Footing, Ground};
 use crate::stage::table::Table;
 
@@ -157,7 +157,7 @@ fn scale_to_bytes<S: Simd>(simd: S, values: &[f32], out: &mut [u8]) {
     let out = out.as_chunks_mut::<16>();
     for (out, values) in out.0.iter_mut().zip(whole) {
         let bytes = (f32x16::from_slice(simd, values) / largest * 255.0).max(0.0);
-        let bytes: u32x16<S> = bytes.to_int();
+        let bytes: i32x16<S> = bytes.to_int();
         for (out, byte) in out.iter_mut().zip(bytes.as_slice()) {
             *out = *byte as u8;
         }

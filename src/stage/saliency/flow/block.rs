@@ -6,7 +6,7 @@ use crate::image::Image;
 /// Side of a block in pixels: blocks overlap by half.
 const BLOCK: usize = 8;
 /// Pixels whose differences are added up at once.
-const GROUP: usize = 16;
+const GROUP: usize = 32;
 /// Pixels of a block.
 pub const AREA: f32 = (BLOCK * BLOCK) as f32;
 
