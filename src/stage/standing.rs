@@ -11,7 +11,7 @@ use std::ops::Range;
 
 use crate::camera::StereoRig;
 use crate::image::{Image, Size};
-use crate::simd::{Level, dispatch};
+use crate::simd::{Level, Simd, dispatch, f32x16, prelude::*, store_inside, u32x16};
 use crate::stage::ground::Plane;
 use crate::stage::regions::components::agree;
 use column::{Columns, Segment, Top};
@@ -254,7 +254,10 @@ impl Standing {
         self.seen.clear();
         self.seen.resize(out.list.len(), 0);
         self.strip.clear(height);
-        let Self { columns: Columns { segments, .. }, thing, seen, limits, strip, .. } = self;
+        // In order, which takes less time than to leave nothing of the last frame in each strip.
+        out.ids.fill(0);
+        let Self { level, columns: Columns { segments, .. }, thing, seen, limits, strip, .. } =
+            self;
         let mut segments = segments.iter().zip(&*thing).filter(|(_, t)| **t != 0).peekable();
         for first in (0..columns).step_by(Strip::WIDTH) {
             let inside = |s: &Segment| (s.x as usize) < first + Strip::WIDTH;
@@ -281,7 +284,7 @@ impl Standing {
                     strip.paint(x, end - n..end, thing, d);
                 }
             }
-            strip.give(first, out);
+            dispatch!(*level, simd => strip.give(simd, first, out));
         }
     }
 }
@@ -321,24 +324,17 @@ impl Strip {
         self.rows = self.rows.start.min(rows.start)..self.rows.end.max(rows.end);
     }
 
-    /// Writes the columns from `first` on, and forgets them.
-    fn give(&mut self, first: usize, out: &mut Things) {
-        for (y, ids) in self.ids.iter().enumerate() {
-            put(ids, &mut out.ids.row_mut(y)[first..]);
-        }
+    /// Writes the columns from `first` on, as many as there are, and forgets them.
+    #[inline(always)]
+    fn give<S: Simd>(&mut self, simd: S, first: usize, out: &mut Things) {
         for y in self.rows.clone() {
-            put(&self.surface[y], &mut out.surface.row_mut(y)[first..]);
+            let ids = u32x16::load_array_ref(simd, &self.ids[y]);
+            store_inside(out.ids.row_mut(y), first, ids);
+            let surface = f32x16::load_array_ref(simd, &self.surface[y]);
+            store_inside(out.surface.row_mut(y), first, surface);
             self.ids[y] = [0; Self::WIDTH];
         }
         self.rows = self.ids.len()..0;
-    }
-}
-
-/// Writes as many of the cells as there is room for.
-fn put<T: Copy>(cells: &[T; Strip::WIDTH], row: &mut [T]) {
-    match row.first_chunk_mut() {
-        Some(row) => *row = *cells,
-        None => row.copy_from_slice(&cells[..row.len()]),
     }
 }
 
