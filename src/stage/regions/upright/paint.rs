@@ -185,6 +185,9 @@ impl Painter {
     ) {
         let size = source.disparity.size();
         let rows = cy * HIGH..((cy + 1) * HIGH).min(size.height);
+        // The lowest row once more where there are fewer.
+        let lines: [&[f32]; HIGH] =
+            std::array::from_fn(|i| source.disparity.row((rows.start + i).min(rows.end - 1)));
         for cells in Spans::new(&self.edges) {
             let id = self.ids[cells.start];
             if id == 0 {
@@ -194,33 +197,36 @@ impl Painter {
             let mut painted = PixelBox::NONE;
             for x in columns.clone().step_by(LANES) {
                 let surface = f32x16::from_slice(simd, &self.surfaces[x..x + LANES]);
-                let tolerance = f32x16::from_slice(simd, &self.tolerances[x..x + LANES]);
                 let slope = f32x16::from_slice(simd, &self.slopes[x..x + LANES]);
+                let near = Near {
+                    surface,
+                    tolerance: f32x16::from_slice(simd, &self.tolerances[x..x + LANES]),
+                    slope,
+                    // What the ground's disparity is raised by, with its constant part.
+                    rise: surface * GROUND_PART + (plane.c + GROUND_PX),
+                };
                 let holes = u8x16::from_slice(simd, &self.holes[x..x + LANES]);
                 let own = holes.simd_ge(u8x16::splat(simd, OWN)).to_bitmask();
                 let inside = holes.simd_eq(u8x16::splat(simd, INSIDE)).to_bitmask();
                 let all = u64::MAX >> (64 - LANES.min(columns.end - x));
-                // What the ground's disparity is raised by, with its constant part.
-                let rise = surface * GROUND_PART + (plane.c + GROUND_PX);
-                let (mut seen, mut seen_rows, mut area) = (0, 0_u64, 0);
                 // All rows at once: nobody foresees the holes, on which more depends.
-                let mut found = [f32x16::splat(simd, f32::NAN); HIGH];
-                for (i, y) in rows.clone().enumerate() {
-                    found[i] = padded(simd, source.disparity.row(y), x, f32::NAN);
+                let [mut on, mut holes] = [[0; HIGH]; 2];
+                for i in 0..HIGH {
+                    let d: f32x16<S> = padded(simd, lines[i], x, f32::NAN);
+                    on[i] = near.of(d, plane.a * (rows.start + i) as f32) & all;
+                    holes[i] = !d.simd_eq(d).to_bitmask() & all;
                 }
+                let (mut seen, mut seen_rows, mut area) = (0, 0_u64, 0);
                 for (i, y) in rows.clone().enumerate() {
-                    let mut d = found[i];
-                    // What does not rise above the ground is none of the thing.
-                    let ground = slope + plane.a * y as f32 + rise;
+                    let (mut bits, mut holes) = (on[i], holes[i]);
                     // Those inside of a thing are its own anyway.
-                    let open = !d.simd_eq(d).to_bitmask() & all & !inside;
+                    let open = holes & !inside;
                     if open != 0 {
                         let filled = fill(simd, source.disparity, &source.left.gray, (x, y));
-                        d = mask32x16::from_bitmask(simd, open).select(filled, d);
+                        bits |= near.of(filled, plane.a * y as f32) & open;
+                        holes &= !(filled.simd_eq(filled).to_bitmask() & open);
                     }
-                    let on = (d - surface).abs().simd_le(tolerance) & d.simd_gt(ground);
-                    let mut bits = on.to_bitmask() & all;
-                    let holes = !d.simd_eq(d).to_bitmask() & own & all;
+                    holes &= own;
                     if holes != 0 {
                         let none = !bits_from(source.roi.matched.row(y), x);
                         // The left pixel of a cell tells.
@@ -228,7 +234,7 @@ impl Painter {
                     }
                     write(simd, &mut out.ids.row_mut(y)[x..], out.first + id - 1, bits);
                     seen |= bits;
-                    seen_rows |= u64::from(bits != 0) << (y - rows.start);
+                    seen_rows |= u64::from(bits != 0) << i;
                     area += bits.count_ones() as usize;
                 }
                 if seen != 0 {
@@ -244,6 +250,25 @@ impl Painter {
             }
             out.boxes[id as usize - 1].join(&painted);
         }
+    }
+}
+
+/// What pixels of a thing are near to.
+struct Near<S: Simd> {
+    surface: f32x16<S>,
+    tolerance: f32x16<S>,
+    /// The ground's change along the row, and what it is raised by.
+    slope: f32x16<S>,
+    rise: f32x16<S>,
+}
+
+impl<S: Simd> Near<S> {
+    /// One bit for each disparity on the surface, of a row in which the ground's disparity is
+    /// `ground`, less what is known here. What does not rise above it is none of the thing.
+    #[inline(always)]
+    fn of(&self, d: f32x16<S>, ground: f32) -> u64 {
+        let on = (d - self.surface).abs().simd_le(self.tolerance);
+        (on & d.simd_gt(self.slope + ground + self.rise)).to_bitmask()
     }
 }
 
