@@ -67,7 +67,7 @@ pub struct Camera {
 
 impl Camera {
     /// An undistorted camera at `(-tx/f, 0, 0)` of the rectified frame, where
-    /// `tx` is P[0,3].
+    /// `tx` is `P[0,3]`.
     pub fn pinhole(size: Size, f: f64, cx: f64, cy: f64, tx: f64) -> Self {
         let k = Matrix3::new(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0);
         let mut p = Matrix3x4::zeros();

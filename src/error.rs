@@ -82,7 +82,7 @@ pub enum CalibrationError {
     Uncalibrated {
         /// `left` or `right`.
         side: &'static str,
-        /// K[0].
+        /// `K[0]`.
         fx: f64,
     },
     /// P has no usable focal length.
@@ -92,7 +92,7 @@ pub enum CalibrationError {
     FocalLength {
         /// `left` or `right`.
         side: &'static str,
-        /// P[0].
+        /// `P[0]`.
         fx: f64,
     },
     /// The two projection matrices do not belong to one rectified pair.
@@ -110,7 +110,7 @@ pub enum CalibrationError {
         "the baseline is zero: P[3] of the right camera info is {tx}; it must be -f*B of a stereo calibration (or set calibration.baseline_override)"
     )]
     BaselineZero {
-        /// Right P[3].
+        /// Right `P[3]`.
         tx: f64,
     },
     /// The right camera stands left of the left one.

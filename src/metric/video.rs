@@ -47,7 +47,7 @@ impl VideoStats {
     }
 
     /// Adds our masks of two frames; `flow` leads back from a pixel of the
-    /// later one, as for [`warped_iou`].
+    /// later one, as for `warped_iou`.
     pub fn add_stability(
         &mut self,
         previous: &Image<u8>,

@@ -2,13 +2,13 @@
 //!
 //! | from | to | function |
 //! |---|---|---|
-//! | `Image` | [`Picture`] | [`picture`], [`picture_into`] |
+//! | `Image` | [`Picture`] | [`picture()`], [`picture_into`] |
 //! | `CompressedImage` | [`Picture`] | [`compressed_picture`], [`compressed_picture_into`] |
 //! | one [`Picture`] of both views | two | [`split_side_by_side`], [`split_side_by_side_into`] |
 //! | `Image`, `CompressedImage` of numbers | `Image<f32>`, `Image<u16>` | [`floats`], [`labels`], [`compressed_u16`] |
 //! | two `CameraInfo` | [`StereoRig`] | [`rig`] |
 //! | [`Camera`] | `CameraInfo` | [`camera_info`] |
-//! | [`Perception`] | messages | [`region_array`], [`detections_2d`], [`markers`], [`annotations`], [`disparity_image`], [`depth_image`], [`points`], [`compressed_depth`], … |
+//! | [`Perception`] | messages | [`region_array`], [`detections_2d`], [`markers`], [`annotations`], [`disparity_image`], [`depth_image`], [`points()`], [`compressed_depth`], … |
 //!
 //! [`StereoRig`]: crate::camera::StereoRig
 //! [`Camera`]: crate::camera::Camera

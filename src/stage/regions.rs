@@ -66,7 +66,7 @@ const NEAR_M: f32 = 10.0;
 pub struct RegionSource<'a> {
     /// The left view.
     pub left: &'a View,
-    /// Attention per cell; that of a pixel is what [`upsample`](super::saliency::upsample)
+    /// Attention per cell; that of a pixel is what [`upsample`](super::saliency::upsample())
     /// makes of it.
     pub attention: &'a Image<f32>,
     /// Region of interest.

@@ -140,7 +140,7 @@ impl Roi {
     }
 
     /// The mask from `attention` per cell; S at a pixel is what
-    /// [`upsample`](super::saliency::upsample) makes of it.
+    /// [`upsample`](super::saliency::upsample()) makes of it.
     ///
     /// `salient` is S >= τ where `depth.min` <= Z <= `depth.max` by the coarse disparity
     /// (cells without one pass), opened and closed, less components smaller

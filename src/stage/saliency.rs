@@ -177,7 +177,7 @@ impl Saliency {
         }
     }
 
-    /// Writes S, 0..=1, per cell of [`CELL`] pixels; [`upsample`] spreads it over pixels.
+    /// Writes S, 0..=1, per cell of [`CELL`] pixels; [`upsample()`] spreads it over pixels.
     pub fn run(&mut self, scene: &Scene<'_>, previous: &mut Previous, attention: &mut Image<f32>) {
         let cells = self.size.divided_by(CELL);
         attention.resize(cells);

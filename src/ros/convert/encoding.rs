@@ -3,7 +3,7 @@
 use super::bayer::Pattern;
 use super::yuv;
 
-/// The encodings that [`picture`](super::picture) reads.
+/// The encodings that [`picture`](super::picture()) reads.
 pub const ENCODINGS: [&str; 29] = [
     "mono8",
     "mono16",

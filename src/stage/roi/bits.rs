@@ -90,7 +90,7 @@ impl BitMask {
         );
     }
 
-    /// The pixels of an image of `size` at which [`upsample`](crate::stage::saliency::upsample)
+    /// The pixels of an image of `size` at which [`upsample`](crate::stage::saliency::upsample())
     /// makes at least `threshold` of a map over its cells.
     pub fn set_from_cells(&mut self, level: Level, cells: &Image<f32>, size: Size, threshold: f32) {
         if size.is_empty() || cells.size() != size.divided_by(CELL) {

@@ -24,7 +24,7 @@ type Step = [u8; LANES];
 ///
 /// In a raster scan a cell depends on two of its neighbours, so that neither
 /// rows nor columns can be computed side by side, but what lies on a diagonal
-/// can (a wavefront). Bands of [`ROWS`] rows are therefore stored askew: step
+/// can (a wavefront). Bands of `ROWS` rows are therefore stored askew: step
 /// `t` of a band holds, row after row, the cells `(t − r, r)`. Of a step the
 /// neighbours to the left are the step before, those above the same one row
 /// further down; to the right and below it is the step after.

@@ -104,7 +104,7 @@ impl Sums {
         sums
     }
 
-    /// Writes the mask and adds up what [`upsample`](crate::stage::saliency::upsample) makes
+    /// Writes the mask and adds up what [`upsample`](crate::stage::saliency::upsample()) makes
     /// of the attention per cell: those are few and at hand, the pixels were
     /// written long ago.
     #[inline(always)]
